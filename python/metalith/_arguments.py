@@ -17,6 +17,9 @@ MOST_16 = 2**16 - 1
 MOST_32 = 2**32 - 1
 MOST_64 = 2**64 - 1
 
+# Shorter wavelengths are micrometres (nm), as for the program.
+LEAST_NM = 10.0
+
 # Places in a layout file have 32 bits, one of them for the sign.
 MOST_NM = 2**31 - 1
 
@@ -141,9 +144,10 @@ def wavelengths(name: str, given: npt.ArrayLike) -> Float64:
     """Wavelengths (nm), in the shape that they were given in."""
     nm: Float64 = numbers(name, given, np.float64, nan=True, remedy="give positive numbers, in nanometres")
     refuse(name, nm, nm > MOST_32, f"give at most {MOST_32}, in nanometres")
-    wrong = nm[~(nm > 0)]
+    wrong = nm[~(nm >= LEAST_NM)]
     if wrong.size:
-        raise MetalithError(f"a wavelength of {wrong[0]:g} nm in `{name}`\n  help: give positive numbers, in nanometres")
+        meant = f"nanometres are meant: {1e3 * wrong[0]:g}?" if wrong[0] > 0 else "give positive numbers, in nanometres"
+        raise MetalithError(f"a wavelength of {wrong[0]:g} nm in `{name}`\n  help: {meant}")
     return nm
 
 

@@ -27,13 +27,18 @@ class CheckReport:
     """What design rules say of a layout."""
 
     clean: bool
-    """Whether all rules ran, and nothing was found that no waiver covers."""
+    """Whether no rule failed to run, and nothing was found that no waiver covers."""
     rules: list[Json] = field(repr=False)
-    """Each rule with its status and counts."""
+    """Each rule with its status and counts. ``not_in_force``: it needs what was not given, such as a ``design``."""
     markers: list[Marker] = field(repr=False)
     """Places, of all rules."""
     numbers: Json = field(repr=False)
     """The whole report, as the JSON of ``metalith check``."""
+
+    def __repr__(self) -> str:
+        broken = [f"{r['id']} {r['violations'] - r['waived']}" for r in self.rules if r["violations"] > r["waived"]]
+        idle = sum(r["status"] == "not_in_force" for r in self.rules)
+        return f"CheckReport(clean={self.clean}, violations: {', '.join(broken) or 'none'}; {idle} of {len(self.rules)} rules not in force)"
 
     def table(self) -> list[dict[str, Any]]:
         """Markers as rows, for ``pandas.DataFrame`` or a loop."""

@@ -193,10 +193,11 @@ class Array:
 
     It can be copied and pickled: as its design, of which it is built again, or as its maps."""
 
-    def __init__(self, native: _native.Array, design: Design | None = None) -> None:
+    def __init__(self, native: _native.Array, design: Design | None = None, of_maps: bool = False) -> None:
         self._native = native
         self.design = design
-        """The design that it was made from; None for pillars that were given as arrays."""
+        """The design that it was made from, or whose elements have these pillars; None for pillars that were given as arrays alone."""
+        self._of_maps = of_maps
 
     @property
     def pillars(self) -> int:
@@ -267,15 +268,19 @@ class Array:
         progress: Progress | None = None,
     ) -> Array:
         """The array of maps of widths (nm), diameters (nm) or rotations (degrees), which are as :func:`write_layout` takes them;
-        nothing is written. ``design``: pitch, shape and lattice are those of its cell, in place of ``pitch_nm``, ``shape`` and
-        ``lattice``. :class:`MetalithError` if a width is odd or wider than the pitch, if maps differ in
-        size, or if several have no centres."""
-        wrong = _native.MetalithError("maps of no cell, or of two\n  help: give `design`, or `pitch_nm` with `shape` and `lattice`")
+        nothing is written. ``design``: the maps are the pillars of its elements, one map each, in place of those that its
+        phase has; cell, places, light and sensor are those of the design, also in :func:`psf`. Leave out ``pitch_nm``, ``shape``,
+        ``lattice`` and ``centres_nm`` then. :class:`MetalithError` if a width is odd, wider than the pitch or none of the
+        design's, if maps differ in size, or if several have no centres."""
+        wrong = _native.MetalithError(
+            "maps of no cell, or of two\n  help: give `design`, or `pitch_nm` with `shape`, `lattice` and `centres_nm`"
+        )
         if design is not None:
-            if pitch_nm is not None or (shape, lattice) != ("square", "square"):
+            if pitch_nm is not None or centres_nm is not None or (shape, lattice) != ("square", "square"):
                 raise wrong
-            cell = design.array()
-            pitch_nm, shape, lattice = cell.pitch_nm, cell.shape, cell.lattice
+            own = shape_of(design._native.shape)
+            maps = [_map("widths", one, own) for one in _arguments.several("widths", widths)]
+            return cls(_native.array_of_design(maps, design._native, progress), design, True)
         if pitch_nm is None:
             raise wrong
         found = [_map("widths", one, shape) for one in _arguments.several("widths", widths)]
@@ -299,19 +304,22 @@ class Array:
             ("shape", self.shape),
             ("sites of an element", f"{self._native.sites} x {self._native.sites}"),
         ]
-        of = "maps" if self.design is None else self.design.name
-        return _html.table(rows, caption=f"array of {of}")
+        maps = ["maps"] if self.design is None or self._of_maps else []
+        names = [] if self.design is None else [self.design.name]
+        return _html.table(rows, caption=f"array of {' for '.join(maps + names)}")
 
     def __copy__(self) -> Array:
-        return Array(self._native, self.design)
+        return Array(self._native, self.design, self._of_maps)
 
     def __deepcopy__(self, _: object) -> Array:
         return self.__copy__()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        if self.design is not None:
+        if self.design is not None and not self._of_maps:
             return Design.array, (self.design,)
         maps = [self.widths(k) for k in range(len(self))]
+        if self.design is not None:
+            return _for_design, (maps, self.design)
         return _of_maps, (maps, self.pitch_nm, self.lattice, self.centres_nm, told_of(self.shape))
 
     def __repr__(self) -> str:
@@ -321,6 +329,11 @@ class Array:
 def _of_maps(*told: Any) -> Array:
     """The array of maps that the native module is told."""
     return Array(_native.array_of_widths(*told))
+
+
+def _for_design(maps: list[Widths], design: Design) -> Array:
+    """The array of a design with other pillars, by their numbers."""
+    return Array(_native.array_of_design(maps, design._native), design, True)
 
 
 @dataclass(frozen=True, eq=False)

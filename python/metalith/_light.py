@@ -262,6 +262,8 @@ def psf(
 
     ``through_focus`` asks for ``planes`` planes along z about the sensor, up to so many micrometres on each side; ``True`` takes two
     depths of focus, twice the wavelength over the square of the numerical aperture. Each PSF then has ``.through_focus``."""
+    if isinstance(of, Design):
+        raise TypeError("PSFs of a design\n  help: give its array, `design.array()`")
     wavelengths = [float(nm) for nm in _arguments.wavelengths("wavelengths_nm", wavelengths_nm).ravel()]
     if not wavelengths:
         raise _native.MetalithError("PSFs at no wavelength\n  help: give at least one in `wavelengths_nm`")

@@ -81,9 +81,8 @@ class Frame:
 class ImagingSystem:
     """A layout behind a camera, for scenes of one size and field.
 
-    The pillars are read from the bytes of the layout. Kernels over the field are made once, which takes a minute for
-    a few lenses of 60 um and minutes for those of 1 mm, and kept on the disk as the program keeps them:
-    ``progress=ml.ProgressLine()`` says how long.
+    The pillars are read from the bytes of the layout. Kernels over the field are made once, which takes minutes, and kept on the
+    disk as the program keeps them: ``progress=ml.ProgressLine()`` says how long.
 
     ``shape``: rows and columns of the scenes. Pixels finer than half a pixel of the sensor are averaged to these, and truth
     and pictures have their number. ``field_deg``: angle from their left to their right edge.

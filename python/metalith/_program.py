@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 
 from . import _native
@@ -9,6 +10,8 @@ from . import _native
 
 def main() -> int:
     """Run the program with the arguments of this process; the answer is its exit code."""
+    # Python's own handler would wait until the program is done.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     return _native.main(sys.argv)
 
 

@@ -21,7 +21,7 @@ def component(
     ``name``: of the component, the one of the file if left out; ``hierarchy`` and ``layer``: as for :meth:`metalith.Array.write`.
     Two calls for equal arrays and names give the same component, which is locked, as those of ``gdsfactory.cell`` are; of
     another array of a name that is taken, the name has ``$1`` and so on added, as have cells below it. ``info`` has
-    ``pillars``, ``pitch_nm``, and of a design ``design`` and its ``digest``.
+    ``pillars``, ``pitch_nm``, of a design ``design``, and its ``digest`` if the pillars are those of its phase.
 
     :func:`metalith.read_layout` reads the file of a chip with components anywhere, or with ``top=component.name`` this one in its
     own place, also at the elements of ``array``.
@@ -47,7 +47,8 @@ def component(
     made.info["pitch_nm"] = array.pitch_nm
     if array.design is not None:
         made.info["design"] = array.design.name
-        made.info["digest"] = array.design.digest
+        if not array._of_maps:
+            made.info["digest"] = array.design.digest
     made.locked = True
     return made
 

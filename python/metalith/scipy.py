@@ -41,7 +41,7 @@ def minimize(
     """The lens with the least merit of its PSF, from the phases (rad) or widths (nm) ``start`` on, shape ``[sites, sites]``: the
     ``OptimizeResult`` of ``scipy.optimize.minimize``, whose ``x`` and ``jac`` have the shape of the lens. ``options`` go to
     scipy, such as ``bounds=[(100, 300)] * start.size`` for widths and ``options={"maxiter": 50}``. ``L-BFGS-B`` does not stop at a
-    small gradient unless ``gtol`` of its options says so: a pillar among thousands has a small share in any merit. ``merit``,
+    small gradient unless ``gtol`` of its options says so: each of thousands of pillars changes a merit by little. ``merit``,
     ``distance_um`` and ``wedge_deg``: as for :meth:`metalith.PsfModel.value_and_gradient`."""
     scipy_optimize = imported("scipy.optimize")
     function = objective(model, merit, distance_um=distance_um, wedge_deg=wedge_deg)

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use metalith::design::CellSpec;
 use metalith::extract::ExtractedElement;
 use metalith::gds::{LayerNumber, ReadLimits};
 use metalith::layout::{FreeLayout, LayoutFormat, OasisEncoding, extraction_plan, write_free, write_pillars_as};
@@ -119,6 +120,12 @@ impl Design {
     #[getter]
     fn lattice(&self) -> String {
         self.design.cell.lattice.to_string()
+    }
+
+    /// Shape of the pillars.
+    #[getter]
+    fn shape(&self) -> ToldShape {
+        told(self.design.cell.shape)
     }
 
     /// Places along an axis of the map of one element.
@@ -314,6 +321,75 @@ pub fn array_of_widths(
         PillarArray::of_maps(shape, placed, p)
     })?;
     Ok(Array { array, design: None })
+}
+
+/// The array of a design with other pillars: one map for each of its elements, in their order.
+#[pyfunction]
+#[pyo3(signature = (widths, design, progress=None))]
+pub fn array_of_design(
+    py: Python<'_>,
+    widths: Vec<PyReadonlyArray2<'_, u16>>,
+    design: &Design,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Array> {
+    let design = design.design.clone();
+    let (cell, lattice, elements) = (&design.cell, design.lattice(), design.elements());
+    if widths.len() != elements.len() {
+        return Err(error(Error::refused(
+            "array/counts-differ",
+            format!(
+                "{} maps of widths for a design of {} elements",
+                widths.len(),
+                elements.len()
+            ),
+            "give one map for each element of the design, or `pitch_nm`, `shape` and `lattice` in place of `design`",
+        )));
+    }
+    let maps = given(widths);
+    let array = work(py, progress, |p| {
+        let placed = maps.into_iter().zip(&elements).map(|(map, element)| {
+            let (rows, columns) = map.dim();
+            let sites = lattice.sites();
+            if (rows, columns) != (sites, sites) {
+                return Err(Error::refused(
+                    "array/sizes-differ",
+                    format!("a map of {rows} x {columns} sites; elements of the design have {sites} x {sites}"),
+                    "give maps of the size of the design: pad smaller ones with zeros",
+                ));
+            }
+            check_places(lattice, &map, |w| *w != 0)?;
+            check_widths(&map, cell)?;
+            Ok((PillarMap { lattice, number: map }, element.centre_nm))
+        });
+        let mut array = PillarArray::of_maps(cell.shape, placed.collect::<metalith::Result<_>>()?, p)?;
+        // Elements look where the design says.
+        for (placed, element) in array.placed.iter_mut().zip(elements) {
+            placed.element = element;
+        }
+        Ok(array)
+    })?;
+    Ok(Array {
+        array,
+        design: Some(design),
+    })
+}
+
+/// Refuse widths (nm) that the cell of a design does not allow, and numbers of rectangles that it does not have.
+fn check_widths(map: &Array2<u16>, cell: &CellSpec) -> metalith::Result<()> {
+    let (least, most) = cell.width_range_nm;
+    if cell.shape.last().is_some() {
+        return check_numbers(cell.shape, map);
+    }
+    let is_on_grid = |w: u16| w.is_multiple_of(2) || !cell.database_unit.is_nanometre();
+    let is_allowed = |w: u16| w == 0 || ((least..=most).contains(&w) && is_on_grid(w));
+    match map.iter().find(|w| !is_allowed(**w)) {
+        Some(wrong) => Err(Error::refused(
+            "array/width-not-of-design",
+            format!("a pillar {wrong} nm wide, and the design allows {least} to {most} nm"),
+            "give even widths within these, change the limits of the design, or give `pitch_nm`, `shape` and `lattice` in place of `design`",
+        )),
+        None => Ok(()),
+    }
 }
 
 /// Copies of arrays of Python, for when its lock is not held.

@@ -55,6 +55,7 @@ fn _native(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<arrays::Array>()?;
     m.add_function(wrap_pyfunction!(main, m)?)?;
     m.add_function(wrap_pyfunction!(arrays::read_layout, m)?)?;
+    m.add_function(wrap_pyfunction!(arrays::array_of_design, m)?)?;
     m.add_function(wrap_pyfunction!(arrays::array_of_widths, m)?)?;
     m.add_function(wrap_pyfunction!(lattices::places, m)?)?;
     m.add_function(wrap_pyfunction!(shapes::rotation_numbers, m)?)?;

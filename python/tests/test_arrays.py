@@ -3,6 +3,7 @@ the argument, its shape, or what stands in it."""
 
 from __future__ import annotations
 
+import pickle
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -243,6 +244,47 @@ def test_maps_of_a_design_have_its_cell() -> None:
     for both in either:
         with pytest.raises(ml.MetalithError, match="design"):
             ml.Array.of_maps(own.widths(0), **both)
+
+
+def test_pillars_for_a_design_are_in_its_light(tmp_path: Path) -> None:
+    design = ml.Design.read(ROOT / "designs/mini_3x3.toml")
+    own = design.array()
+    maps = [own.widths(k) for k in range(len(own))]
+    same = ml.Array.of_maps(maps, design=design)
+    asked: dict[str, Any] = {"elements": [1], "samples": 32, "fast": True, "fidelity": "published"}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        seen = [ml.psf(array, [530], **asked)[0] for array in (own, same, pickle.loads(pickle.dumps(same)))]
+    for other in seen[1:]:
+        assert (other.strehl, other.pixel_um) == (seen[0].strehl, seen[0].pixel_um)
+        np.testing.assert_array_equal(other.values, seen[0].values)
+    files = [tmp_path / name for name in ("own.gds", "same.gds")]
+    own.write(files[0])
+    same.write(files[1])
+    assert files[0].read_bytes() == files[1].read_bytes()
+    wrong = [m.copy() for m in maps]
+    wrong[2][wrong[2] > 0] = 20
+    for given, match in [(wrong, "20 nm wide, and the design allows 100 to 300"), (maps[:2], "2 maps"), ([m[1:, 1:] for m in maps], "sites")]:
+        with pytest.raises(ml.MetalithError, match=match):
+            ml.Array.of_maps(given, design=design)
+
+
+@pytest.mark.parametrize("nm", [0.53, 0.0, -530.0])
+def test_wavelengths_are_nanometres(nm: float) -> None:
+    calls: list[Callable[[], Any]] = [
+        lambda: ml.psf(WIDTHS, [nm], pitch_nm=350, distance_um=5, pillar="sin_luke_2015"),
+        lambda: ml.index("sin_luke_2015", nm),
+        lambda: ml.cell(200, nm),
+    ]
+    for call in calls:
+        with pytest.raises(ml.MetalithError, match="nanometres"):
+            call()
+
+
+def test_limits_of_widths_are_told_before_cells_are_solved() -> None:
+    for limits, match in [((300, 100), "narrowest pillar of 300 nm"), ((5, 300), "10 nm or more"), ((100, 900), "900 nm are asked for")]:
+        with pytest.raises(ml.MetalithError, match=match):
+            ml.Design.lens(wavelength_nm=850, focal_length_um=75, diameter_um=50, width_nm=limits)
 
 
 def test_a_guessed_cell_is_said() -> None:

@@ -31,6 +31,9 @@ const FINEST_CHORD_NM: f64 = 5.0;
 /// Shorter wavelengths are micrometres (nm).
 const SHORTEST_NM: f64 = 10.0;
 
+/// Narrowest pillar that a design file takes (nm).
+const NARROWEST_NM: u16 = 10;
+
 /// Shortest and longest pitch of a design (nm).
 const PITCHES_NM: std::ops::RangeInclusive<f64> = 100.0..=20_000.0;
 
@@ -139,8 +142,17 @@ impl NewDesign {
         self.steering_deg.unwrap_or(usual)
     }
 
+    /// Refuse a wavelength that is one of micrometres, and limits of widths that no pillars are within.
+    ///
+    /// # Errors
+    /// For each of these.
+    pub(crate) fn check_given(&self) -> Result<()> {
+        self.check_unit()?;
+        self.check_widths()
+    }
+
     /// Refuse a wavelength that is one of micrometres.
-    pub(crate) fn check_unit(&self) -> Result<()> {
+    fn check_unit(&self) -> Result<()> {
         match self.wavelength_nm {
             Some(nm) if nm > 0.0 && nm < SHORTEST_NM => Err(Error::refused(
                 "new/out-of-range",
@@ -151,8 +163,28 @@ impl NewDesign {
         }
     }
 
+    /// Refuse limits of widths that no pillars are within.
+    fn check_widths(&self) -> Result<()> {
+        let (least, most) = (self.width_min_nm, self.width_max_nm);
+        if let Some(nm) = [least, most].into_iter().flatten().find(|nm| *nm < NARROWEST_NM) {
+            return Err(Error::refused(
+                "new/out-of-range",
+                format!("pillars {nm} nm wide"),
+                format!("give widths of {NARROWEST_NM} nm or more"),
+            ));
+        }
+        match (least, most) {
+            (Some(least), Some(most)) if least >= most => Err(Error::refused(
+                "new/widths-exchanged",
+                format!("a narrowest pillar of {least} nm and a widest of {most} nm"),
+                "give a widest pillar that is wider than the narrowest",
+            )),
+            _ => Ok(()),
+        }
+    }
+
     fn check(&self) -> Result<()> {
-        self.check_unit()?;
+        self.check_given()?;
         let (nm, diameter_um, focal_length_um) = (self.wavelength_nm(), self.diameter_um(), self.focal_length_um());
         let (diameters, focal_lengths) = (DIAMETER.range, FOCAL_LENGTH.range);
         let is_lens = diameters.contains(&diameter_um) && focal_lengths.contains(&focal_length_um);

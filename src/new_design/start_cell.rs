@@ -133,6 +133,20 @@ fn unit_line(cell: &ChosenCell) -> String {
     line("database_unit_nm", unit, &why)
 }
 
+/// Reason for a limit of widths (nm): that it is as asked, or the nearest step to what was asked.
+fn in_steps(asked: Option<u16>, taken: u16, why: &str) -> String {
+    let origin = match asked {
+        None => return why.to_owned(),
+        Some(nm) if nm == taken => "as asked".to_owned(),
+        Some(nm) => format!("for {nm} as asked, in whole steps"),
+    };
+    if why.is_empty() {
+        origin
+    } else {
+        format!("{origin}; {why}")
+    }
+}
+
 impl StartCell {
     /// The silicon nitride pillars of the paper, for colour.
     pub(crate) fn of_the_paper() -> Self {
@@ -240,15 +254,16 @@ impl StartCell {
             line(
                 "width_min_nm",
                 cell.widths_nm.0,
-                &given(
-                    request.width_min_nm.is_some(),
-                    "the narrowest pillar, and below the narrowest gap: ask your cleanroom".into(),
+                &in_steps(
+                    request.width_min_nm,
+                    cell.widths_nm.0,
+                    "the narrowest pillar, and below the narrowest gap: ask your cleanroom",
                 ),
             ),
             line(
                 "width_max_nm",
                 cell.widths_nm.1,
-                if request.width_max_nm.is_some() { "as asked" } else { "" },
+                &in_steps(request.width_max_nm, cell.widths_nm.1, ""),
             ),
             line(
                 "width_step_nm",

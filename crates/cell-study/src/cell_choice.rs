@@ -329,8 +329,18 @@ impl CellRequest {
         let gapped = self
             .width_max_nm
             .map_or(widest - (GAP * widest).max(LEAST_NM), f64::from);
+        let widest_with_gaps = widest - LEAST_NM;
+        if gapped > widest_with_gaps {
+            return Err(Error::refused(
+                "new/width-too-wide",
+                format!(
+                    "a pitch of {pitch_nm} nm leaves pillars of up to {widest_with_gaps} nm with gaps of {LEAST_NM} nm, and {gapped} nm are asked for"
+                ),
+                "take a narrower widest pillar, a longer pitch, or a longer wavelength",
+            ));
+        }
         let low = step * (narrowest / step).ceil();
-        let high = step * (gapped.min(widest) / step).floor();
+        let high = step * (gapped / step).floor();
         if high < low + LEAST_STEPS * step {
             let (gaps, remedy) = match (self.width_min_nm, self.width_max_nm) {
                 (None, None) => (format!(", with pillars and gaps of {LEAST_NM} nm at least"), ""),
