@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from . import _arguments, _html, _native
-from ._layouts import Design
+from ._layouts import Design, native_design
 from ._types import Json, PathLike, Progress
+
+DESIGN_FIRST = "give a metalith.Design first"
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ def check(
     """Check a layout against design rules: those of the program for the shape of its pillars, or for the ``design``, if
     ``rules`` is left out. ``design`` puts the rules in force that compare with it. ``layer`` (layer and datatype) is that
     of the pillars, if it is not as the rules say; ``top`` the cell to start from, if the layout has several."""
-    native = design._native if design is not None else None
+    native = native_design(design) if design is not None else None
     most = _arguments.whole("markers", markers, 0, _arguments.MOST_32)
     on = None if layer is None else _arguments.layer(layer)
     text, clean = _native.check(layout, rules, native, list(with_layouts), waivers, most, progress, on, top)
@@ -109,7 +111,7 @@ def verify(
     ``model``: judge the chip as made, by the model of a calibration. ``out``: a folder for the page. ``layer`` (layer and
     datatype) is that of the pillars, if it is not as the design says; ``top`` the cell to start from, if the layout has several."""
     on = None if layer is None else _arguments.layer(layer)
-    text, passed = _native.verify(design._native, layout, fast, model, out, progress, on, top)
+    text, passed = _native.verify(native_design(design, DESIGN_FIRST), layout, fast, model, out, progress, on, top)
     found = json.loads(text)
     return Verification(passed=passed, checks=found["checks"], numbers=found)
 
@@ -159,7 +161,7 @@ def plan(
     of the design are written into ``out``. ``effects``: plan for these alone. ``layer`` and ``top``: as in :func:`verify`. A
     folder with frames is not overwritten. It takes minutes."""
     on = None if layer is None else _arguments.layer(layer)
-    told = _native.plan(design._native, bench, out, layout, list(effects), progress, on, top)
+    told = _native.plan(native_design(design, DESIGN_FIRST), bench, out, layout, list(effects), progress, on, top)
     text, finds_all, sentence = told
     found = json.loads(text)
     return MeasurementPlan(

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _arguments, _native
-from ._layouts import Design
+from ._layouts import Design, native_design
 from ._light import MOST_SAMPLES
 from ._shapes import Lattice, places
 from ._types import Float64, Progress, Widths
@@ -18,6 +18,8 @@ from ._types import Float64, Progress, Widths
 Merit: TypeAlias = Union[Callable[[Float64], "tuple[float, npt.ArrayLike]"], npt.NDArray[Any]]
 """A merit of a PSF: a function of its values that gives the merit and its derivatives by them, of their shape; or weights of
 the values, whose sum is the merit."""
+
+MAPS_FIRST = "give phases or widths first, then a metalith.Design"
 
 Pullback: TypeAlias = "Callable[[npt.ArrayLike], PsfGradient]"
 """From the derivatives of a merit by the values of a PSF to those by what the PSF is a function of."""
@@ -29,8 +31,9 @@ def widths_of(phase_rad: npt.ArrayLike, design: Design, *, element: SupportsInde
     whose width is zero. ``element``: of a design whose steered elements have mappings of their own, the number of the element
     from zero; left out, the mapping that all others have. :class:`MetalithError` if a phase is infinite, or there is no such
     element."""
+    native, chosen = native_design(design, MAPS_FIRST), _element(design, element)
     phases = _arguments.phases("phase_rad", phase_rad)
-    return _native.widths_of(phases.ravel(), design._native, _element(design, element)).reshape(phases.shape)
+    return _native.widths_of(phases.ravel(), native, chosen).reshape(phases.shape)
 
 
 def phases_of(width_nm: npt.ArrayLike, design: Design, *, element: SupportsIndex | None = None) -> Float64:
@@ -38,8 +41,9 @@ def phases_of(width_nm: npt.ArrayLike, design: Design, *, element: SupportsIndex
     rectangles: the middle of the phases that are rounded to the width, so that :func:`widths_of` gives the width again. float64 of
     the shape of ``width_nm``, NaN where the width is zero. ``element``: as for :func:`widths_of`. :class:`MetalithError`
     for a width that the mapping has for no phase, with the widths that it has."""
+    native, chosen = native_design(design, MAPS_FIRST), _element(design, element)
     widths = _arguments.widths("width_nm", width_nm)
-    phases, missing, known = _native.phases_of(widths.ravel(), design._native, _element(design, element))
+    phases, missing, known = _native.phases_of(widths.ravel(), native, chosen)
     if missing is not None:
         at = tuple(int(k) for k in np.unravel_index(missing, widths.shape))
         raise _native.MetalithError(
@@ -50,8 +54,6 @@ def phases_of(width_nm: npt.ArrayLike, design: Design, *, element: SupportsIndex
 
 
 def _element(design: Design, element: SupportsIndex | None) -> int | None:
-    if not isinstance(design, Design):
-        raise TypeError(f"`design` is a {type(design).__name__}\n  help: give phases or widths first, then a metalith.Design")
     return None if element is None else _arguments.element(element, len(design.elements))
 
 

@@ -188,6 +188,13 @@ def _unpickled(text: str, path: str, digest: str) -> Design:
     return design
 
 
+def native_design(given: Design, remedy: str = "give a metalith.Design, such as `Design.read(path)`") -> _native.Design:
+    """The native design of what was given as ``design``."""
+    if not isinstance(given, Design):
+        raise TypeError(f"`design` is a {type(given).__name__}\n  help: {remedy}")
+    return given._native
+
+
 class Array:
     """The pillars of all elements of a chip.
 

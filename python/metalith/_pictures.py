@@ -12,7 +12,7 @@ import numpy.typing as npt
 from . import _arguments, _html, _native
 from ._figures import imported, subplots
 from ._kernels import Kernels
-from ._layouts import Design
+from ._layouts import Design, native_design
 from ._types import Float64, PathLike, Progress
 
 # Pixels along a side of a scene, as in the program.
@@ -115,7 +115,7 @@ class ImagingSystem:
         self.shape = shape
         self.field_deg = field_deg
         self._native = _native.ImagingSystem.open(
-            design._native, layout, camera, rows, columns, field_deg, distance_mm, model, prior, lux, time_ms, longest_ms, progress
+            native_design(design), layout, camera, rows, columns, field_deg, distance_mm, model, prior, lux, time_ms, longest_ms, progress
         )
         files = (None if path is None else os.path.abspath(path) for path in (layout, camera, model, prior))
         self._opened = (design, *files, shape, field_deg, distance_mm, lux, time_ms, longest_ms)

@@ -122,6 +122,7 @@ class Calls:
             "Array.widths": lambda: self.array.widths(0),
             "Array.write": lambda: self.array.write(self.new(".oas")),
             "array_of_widths": self.written,
+            "array_of_design": lambda: ml.Array.of_maps([self.array.widths(k) for k in range(len(self.array))], design=self.design).widths(0),
             "read_layout": lambda: ml.read_layout(self.chip).widths[0],
             "places": lambda: ml.places(5, pitch_nm=350).x_nm,
             "rotation_numbers": lambda: RECTANGLES.numbers(turns),

@@ -281,6 +281,22 @@ def test_wavelengths_are_nanometres(nm: float) -> None:
             call()
 
 
+def test_what_is_no_design_is_told() -> None:
+    wrong: Any = "chip.gds"
+    calls: list[Callable[[], Any]] = [
+        lambda: ml.verify(wrong, wrong),
+        lambda: ml.check(wrong, design=wrong),
+        lambda: ml.plan(wrong, wrong, wrong),
+        lambda: ml.widths_of(wrong, wrong),
+        lambda: ml.ImagingSystem(wrong, wrong, wrong, shape=(8, 8)),
+    ]
+    for call in calls:
+        with pytest.raises(TypeError, match="`design` is a str"):
+            call()
+    with pytest.raises(TypeError, match="design.array"):
+        ml.psf(ml.Design.read(ROOT / "designs/mini_3x3.toml"), [530])  # type: ignore[arg-type]
+
+
 def test_limits_of_widths_are_told_before_cells_are_solved() -> None:
     for limits, match in [((300, 100), "narrowest pillar of 300 nm"), ((5, 300), "10 nm or more"), ((100, 900), "900 nm are asked for")]:
         with pytest.raises(ml.MetalithError, match=match):
