@@ -146,14 +146,15 @@ class PsfModel:
         is verified at, if left out). ``variable``: lenses are given by their phases (rad), or by widths (nm) from the
         narrowest to the widest pillar of the design, whose transmissions are solved with ``fidelity``. ``window``: any of
         ``amplitude``, ``at_um``, ``samples``, ``step_um``, ``incidence_deg``, ``fast``."""
+        native = native_design(design)
         nm = design.wavelengths_nm[0] if wavelength_nm is None else wavelength_nm
         if variable == "width":
-            window["cell"] = _native.curve_of(design._native, float(nm), fidelity, progress)
+            window["cell"] = _native.curve_of(native, float(nm), fidelity, progress)
         elif variable != "phase":
             raise _native.MetalithError(f"`variable` = {variable!r}\n  help: give 'phase' or 'width'")
         window.setdefault("diameter_um", None if "amplitude" in window else design.diameter_um)
         return cls(
-            design._native.sites,
+            native.sites,
             pitch_nm=design.pitch_nm,
             lattice=design.lattice,
             wavelength_nm=nm,

@@ -285,9 +285,10 @@ class Array:
         if design is not None:
             if pitch_nm is not None or centres_nm is not None or (shape, lattice) != ("square", "square"):
                 raise wrong
-            own = shape_of(design._native.shape)
+            native = native_design(design)
+            own = shape_of(native.shape)
             maps = [_map("widths", one, own) for one in _arguments.several("widths", widths)]
-            return cls(_native.array_of_design(maps, design._native, progress), design, True)
+            return cls(_native.array_of_design(maps, native, progress), design, True)
         if pitch_nm is None:
             raise wrong
         found = [_map("widths", one, shape) for one in _arguments.several("widths", widths)]

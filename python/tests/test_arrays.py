@@ -288,6 +288,8 @@ def test_what_is_no_design_is_told() -> None:
         lambda: ml.check(wrong, design=wrong),
         lambda: ml.plan(wrong, wrong, wrong),
         lambda: ml.widths_of(wrong, wrong),
+        lambda: ml.PsfModel.of_design(wrong),
+        lambda: ml.Array.of_maps(wrong, design=wrong),
         lambda: ml.ImagingSystem(wrong, wrong, wrong, shape=(8, 8)),
     ]
     for call in calls:

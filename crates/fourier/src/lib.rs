@@ -7,55 +7,39 @@
 use std::sync::Arc;
 
 use realfft::RealFftPlanner;
-use rustfft::{FftNum, FftPlanner};
+use rustfft::{FftDirection, FftNum, FftPlanner};
 
 pub use realfft::{ComplexToReal, RealToComplex};
 pub use rustfft::Fft;
 
 /// Precision of transforms: `f32` or `f64`.
-///
-/// Of `n` values x the transform has the values X(k) = sum over m of x(m) exp(-+ 2 pi i k m / n), with the minus forward and
-/// the plus inverse. Neither is normalised: one after the other multiplies by n.
 pub trait Precision: FftNum {
-    /// Plan of the forward transform of `n` values.
-    fn forward(n: usize) -> Arc<dyn Fft<Self>>;
-
-    /// Plan of the inverse transform of `n` values.
-    fn inverse(n: usize) -> Arc<dyn Fft<Self>>;
+    /// Plan of a transform of `n` values.
+    fn plan(n: usize, direction: FftDirection) -> Arc<dyn Fft<Self>>;
 }
 
 impl Precision for f32 {
     #[inline(never)]
-    fn forward(n: usize) -> Arc<dyn Fft<Self>> {
-        FftPlanner::new().plan_fft_forward(n)
-    }
-
-    #[inline(never)]
-    fn inverse(n: usize) -> Arc<dyn Fft<Self>> {
-        FftPlanner::new().plan_fft_inverse(n)
+    fn plan(n: usize, direction: FftDirection) -> Arc<dyn Fft<Self>> {
+        FftPlanner::new().plan_fft(n, direction)
     }
 }
 
 impl Precision for f64 {
     #[inline(never)]
-    fn forward(n: usize) -> Arc<dyn Fft<Self>> {
-        FftPlanner::new().plan_fft_forward(n)
-    }
-
-    #[inline(never)]
-    fn inverse(n: usize) -> Arc<dyn Fft<Self>> {
-        FftPlanner::new().plan_fft_inverse(n)
+    fn plan(n: usize, direction: FftDirection) -> Arc<dyn Fft<Self>> {
+        FftPlanner::new().plan_fft(n, direction)
     }
 }
 
-/// Plan of the forward transform of `n` values.
+/// Plan of the forward transform X(k) = sum over m of x(m) exp(-2 pi i k m / n) of `n` values.
 pub fn forward<T: Precision>(n: usize) -> Arc<dyn Fft<T>> {
-    T::forward(n)
+    T::plan(n, FftDirection::Forward)
 }
 
-/// Plan of the inverse transform of `n` values.
+/// Plan of the inverse transform of `n` values, with the other sign. It is not normalised: after the forward one it multiplies by n.
 pub fn inverse<T: Precision>(n: usize) -> Arc<dyn Fft<T>> {
-    T::inverse(n)
+    T::plan(n, FftDirection::Inverse)
 }
 
 /// Plan of the forward transform of `n` real values, whose result is its first n / 2 + 1 values.

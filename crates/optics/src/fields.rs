@@ -11,7 +11,8 @@ use metalith_core::Result;
 use metalith_pillars::{Lattice, PillarRows};
 use metalith_wave::propagation::{Direction, Together};
 use metalith_wave::{
-    Accuracy, Aperture, FoldedPropagator, Pillars, PlaneWave, Propagator, Psf, Scratch, TransmissionMap, Window,
+    Accuracy, Aperture, ApertureSet, FoldedPropagator, Pillars, PlaneWave, Propagator, Psf, Scratch, TransmissionMap,
+    Window,
 };
 
 /// Fields of an element in light that arrives: the sum of the intensities of its fields, each times the weight.
@@ -79,29 +80,17 @@ impl Field<'_> {
         })
     }
 
-    /// True if both are of the same pillars among neighbours, in light that is the same to them.
-    fn has_rows_of(&self, other: &Self) -> bool {
-        let (
+    /// Identity of rows of pillars among neighbours: equal ones transmit the same. None of pillars that stand for themselves.
+    fn rows(&self) -> Option<(*const NeighbourSites, *const CellResponse, [f64; 2], usize)> {
+        match self {
             Self::Coupled {
                 sites,
                 response,
                 sines,
                 polarisation,
-            },
-            Self::Coupled {
-                sites: other_sites,
-                response: other_response,
-                sines: other_sines,
-                polarisation: other_polarisation,
-            },
-        ) = (self, other)
-        else {
-            return false;
-        };
-        std::ptr::eq(*sites, *other_sites)
-            && Arc::ptr_eq(response, other_response)
-            && sines == other_sines
-            && polarisation == other_polarisation
+            } => Some((std::ptr::from_ref(*sites), Arc::as_ptr(response), *sines, *polarisation)),
+            Self::Drawn { .. } | Self::Formed(_) | Self::AsBuilt { .. } => None,
+        }
     }
 
     /// |t|^2 summed over sites of what missing pillars scatter, each on its own.
@@ -153,27 +142,22 @@ impl<'e> IncoherentFields<'e> {
         }
     }
 
-    /// The fields of both polarisations as a set whose rows are formed together; none where they are formed one by one.
-    fn both_polarised(&self) -> Option<NeighbourPillars<'_, 2>> {
-        let [
-            Field::Coupled {
-                sites, response, sines, ..
-            },
-            Field::Coupled { .. },
-        ] = &self.fields[..]
-        else {
-            return None;
-        };
-        let CellResponse::Neighbours(NeighbourTables::Fitted(fitted)) = response.as_ref() else {
-            return None;
-        };
-        Some(NeighbourPillars::polarised(sites, &fitted.responses, *sines))
-    }
-
-    /// The fields of both polarisations as a set, where their rows have been formed.
-    fn both_formed(&self) -> Option<Together<'_>> {
+    /// The fields of both polarisations as a set whose rows are formed, or sent to a window, together; none where that is done one by
+    /// one.
+    fn both_polarised(&self) -> Option<Box<dyn ApertureSet + '_>> {
         match &self.fields[..] {
-            [Field::Formed(s), Field::Formed(p)] => Some(Together(vec![s.as_ref(), p.as_ref()])),
+            [Field::Formed(s), Field::Formed(p)] => Some(Box::new(Together(vec![s.as_ref(), p.as_ref()]))),
+            [
+                Field::Coupled {
+                    sites, response, sines, ..
+                },
+                Field::Coupled { .. },
+            ] => match response.as_ref() {
+                CellResponse::Neighbours(NeighbourTables::Fitted(fitted)) => {
+                    Some(Box::new(NeighbourPillars::polarised(sites, &fitted.responses, *sines)))
+                }
+                _ => None,
+            },
             _ => None,
         }
     }
@@ -202,13 +186,14 @@ impl<'e> IncoherentFields<'e> {
     /// True if both are of the same pillars among neighbours, in light that is the same to them.
     fn has_rows_of(&self, other: &Self) -> bool {
         let mut pairs = self.fields.iter().zip(&other.fields);
-        self.fields.len() == other.fields.len() && pairs.all(|(a, b)| a.has_rows_of(b))
+        self.fields.len() == other.fields.len()
+            && pairs.all(|(a, b)| a.rows().is_some_and(|rows| b.rows() == Some(rows)))
     }
 
     /// The transmissions of the sites of each field.
     fn formed(&self) -> Result<Vec<TransmissionMap>> {
         if let Some(set) = self.both_polarised() {
-            return Ok(TransmissionMap::of_set(&set, self.radius_um));
+            return Ok(TransmissionMap::of_set(set.as_ref(), self.radius_um));
         }
         let of = |field: &Field<'_>| {
             let aperture = field.aperture(&self.light)?;
@@ -319,9 +304,7 @@ impl<'e> IncoherentFields<'e> {
     pub fn psf_by(&self, propagator: &dyn Propagator, lp_mm: &[f64], scratch: &mut Scratch) -> Result<Psf> {
         let wave = &self.light.plane;
         let psfs = if let Some(set) = self.both_polarised() {
-            Psf::formed_of_set(propagator, &set, wave, lp_mm, scratch)?
-        } else if let Some(set) = self.both_formed() {
-            Psf::formed_of_set(propagator, &set, wave, lp_mm, scratch)?
+            Psf::formed_of_set(propagator, set.as_ref(), wave, lp_mm, scratch)?
         } else {
             let of = |field: &Field<'_>| {
                 let aperture = field.aperture(&self.light)?;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use metalith_fourier::{Fft, Precision};
+use metalith_fourier::{Fft, Precision, forward};
 use num_complex::Complex;
 
 /// Transforms of arrays of one size, row by row.
@@ -15,7 +15,7 @@ pub(crate) struct Fft2<T: Precision> {
 impl<T: Precision> Fft2<T> {
     /// Transforms of `rows` x `cols` numbers, forward or inverse (not normalised).
     pub(crate) fn new(rows: usize, cols: usize, inverse: bool) -> Self {
-        let plan = if inverse { T::inverse } else { T::forward };
+        let plan = if inverse { metalith_fourier::inverse } else { forward };
         Self {
             rows,
             cols,
