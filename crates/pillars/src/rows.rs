@@ -47,8 +47,9 @@ pub trait PillarRows: Sync {
     fn largest_number(&self) -> u16 {
         let n = self.lattice().sites();
         let mut room = Vec::new();
-        let in_row = |iy| self.row(iy, 0..n, &mut room).iter().copied().max().unwrap_or(0);
-        (0..n).map(in_row).max().unwrap_or(0)
+        // A fold of the larger of two is compiled to vectors, `max` is not.
+        let in_row = |largest: u16, iy| self.row(iy, 0..n, &mut room).iter().fold(largest, |a, &w| a.max(w));
+        (0..n).fold(0, in_row)
     }
 
     /// Radius of the circle about the element's centre that holds the centres of all of its pillars (um); zero without
