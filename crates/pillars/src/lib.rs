@@ -25,7 +25,7 @@ pub use pillar_check::PillarCheck;
 pub use pillar_map::PillarMap;
 pub use pitch::{DatabaseUnit, Pitch};
 pub use rectangle::{Rectangles, RotatedRectangles, UprightRectangles};
-pub use rows::PillarRows;
+pub use rows::{PillarRows, RowExtent};
 pub use shape::PillarShape;
 pub use square::Square;
 pub use steepness::Steepness;

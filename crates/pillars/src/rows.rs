@@ -4,6 +4,29 @@ use std::ops::Range;
 
 use crate::{Lattice, PillarMap};
 
+/// Pillars among some columns of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RowExtent {
+    /// First and last column with a pillar.
+    pub first: usize,
+    pub last: usize,
+    /// Number of pillars.
+    pub pillars: u64,
+}
+
+impl RowExtent {
+    /// Extent of consecutive sites of a row from a column on, zero where no pillar is; none without pillars.
+    pub fn of(column: usize, sites: &[u16]) -> Option<Self> {
+        let first = sites.iter().position(|&w| w != 0)?;
+        let last = sites.iter().rposition(|&w| w != 0)?;
+        Some(Self {
+            first: column + first,
+            last: column + last,
+            pillars: sites[first..=last].iter().filter(|&&w| w != 0).count() as u64,
+        })
+    }
+}
+
 /// The pillars of one element, each told by a number: the width of a square or a circle (nm), the number of a rectangle. An element of 10 mm has 800 million sites: who reads it row by row needs none but a row
 /// of them in memory.
 pub trait PillarRows: Sync {
@@ -20,6 +43,11 @@ pub trait PillarRows: Sync {
     /// one.
     fn occupied<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
         self.row(iy, columns, room)
+    }
+
+    /// Extent and number of the pillars among some columns of row `iy`; none where there is no pillar.
+    fn extent(&self, iy: usize, columns: Range<usize>, room: &mut Vec<u16>) -> Option<RowExtent> {
+        RowExtent::of(columns.start, self.occupied(iy, columns, room))
     }
 
     /// Call `with` with row, column and number of every pillar, rows from below.
@@ -39,8 +67,8 @@ pub trait PillarRows: Sync {
     fn pillars(&self) -> u64 {
         let n = self.lattice().sites();
         let mut room = Vec::new();
-        let in_row = |iy| self.occupied(iy, 0..n, &mut room).iter().filter(|&&w| w != 0).count() as u64;
-        (0..n).map(in_row).sum()
+        let rows = (0..n).filter_map(|iy| self.extent(iy, 0..n, &mut room));
+        rows.map(|row| row.pillars).sum()
     }
 
     /// The largest number of a pillar: the width of the widest square or circle (nm); zero without pillars.
@@ -58,10 +86,9 @@ pub trait PillarRows: Sync {
         let lattice = self.lattice();
         let (n, mut radius2, mut room) = (lattice.sites(), 0, Vec::new());
         for iy in 0..n {
-            let row = self.occupied(iy, 0..n, &mut room);
-            let mut ends = row.iter().enumerate().filter(|(_, w)| **w != 0).map(|(ix, _)| ix);
-            for ix in ends.next().into_iter().chain(ends.next_back()) {
-                radius2 = radius2.max(lattice.units2(ix, iy));
+            if let Some(row) = self.extent(iy, 0..n, &mut room) {
+                let [first, last] = [row.first, row.last].map(|ix| lattice.units2(ix, iy));
+                radius2 = radius2.max(first).max(last);
             }
         }
         (radius2 as f64).sqrt() * lattice.unit_um()

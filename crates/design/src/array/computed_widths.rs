@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use metalith_pillars::{EighthMap, Lattice, PillarMap, PillarRows, PillarShape};
+use metalith_pillars::{EighthMap, Lattice, PillarMap, PillarRows, PillarShape, RowExtent};
 
 use super::{PillarRule, Symmetry, SymmetryGroup};
 use crate::Element;
@@ -110,6 +110,17 @@ impl PillarRows for ComputedWidths {
 
     fn row<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
         let (phase, along_y) = (self.phase(), self.phase_along_y());
+        if let (None, Some(inside)) = (&along_y, phase.columns(iy)) {
+            // Most of what is asked for is inside: no site is asked whether it is.
+            let inside = inside.start.max(columns.start)..inside.end.min(columns.end);
+            room.clear();
+            if !inside.is_empty() {
+                room.resize(inside.start - columns.start, 0);
+                room.extend(inside.map(|ix| self.rule.width_nm(phase.wrapped_inside(ix, iy))));
+            }
+            room.resize(columns.len(), 0);
+            return room;
+        }
         let width = |ix, iy| self.rule.pillar(&phase, along_y.as_ref(), ix, iy);
         Self::fill(iy, columns, room, width)
     }
@@ -117,6 +128,18 @@ impl PillarRows for ComputedWidths {
     fn occupied<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
         let phase = self.phase();
         Self::fill(iy, columns, room, |ix, iy| u16::from(phase.holds(ix, iy)))
+    }
+
+    fn extent(&self, iy: usize, columns: Range<usize>, room: &mut Vec<u16>) -> Option<RowExtent> {
+        let Some(inside) = self.phase().columns(iy) else {
+            return RowExtent::of(columns.start, self.occupied(iy, columns, room));
+        };
+        let (start, end) = (inside.start.max(columns.start), inside.end.min(columns.end));
+        (start < end).then(|| RowExtent {
+            first: start,
+            last: end - 1,
+            pillars: (end - start) as u64,
+        })
     }
 }
 
@@ -191,5 +214,8 @@ impl PillarRows for ClassPillars {
 
     fn occupied<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
         self.rows().occupied(iy, columns, room)
+    }
+    fn extent(&self, iy: usize, columns: Range<usize>, room: &mut Vec<u16>) -> Option<RowExtent> {
+        self.rows().extent(iy, columns, room)
     }
 }

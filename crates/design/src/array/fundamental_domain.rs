@@ -3,7 +3,7 @@
 use std::cmp::Ordering;
 use std::ops::Range;
 
-use metalith_pillars::PillarRows;
+use metalith_pillars::{PillarRows, RowExtent};
 
 use super::{Symmetry, SymmetryGroup};
 
@@ -41,16 +41,14 @@ impl SymmetryGroup {
                 let Some(stabiliser) = run.clone().next().and_then(|ix| self.stabiliser(n, ix, iy)) else {
                     continue;
                 };
-                let row = widths.occupied(iy, run.clone(), &mut room);
-                let Some(first) = row.iter().position(|&w| w != 0) else {
+                let Some(RowExtent { first, pillars, .. }) = widths.extent(iy, run.clone(), &mut room) else {
                     continue;
                 };
-                let pillars = row.iter().filter(|&&w| w != 0).count() as u64;
                 match parts.iter_mut().find(|part| part.stabiliser == stabiliser) {
                     Some(part) => part.pillars += pillars,
                     None => parts.push(DomainPart {
                         stabiliser,
-                        copies: self.copies(n, run.start + first, iy),
+                        copies: self.copies(n, first, iy),
                         pillars,
                     }),
                 }

@@ -14,8 +14,9 @@ const ANY_FILE_S: f64 = 5.0;
 const A_MEGABYTE_S: f64 = 5.0;
 const NOT_OPTIMISED: f64 = 30.0;
 
-/// CPU seconds beside other tests over those alone: both cores share one memory.
-const BESIDE_OTHERS: f64 = 2.0;
+/// CPU seconds beside other tests, in a slow hour, over those alone in a fast one: both cores share one memory, and machines differ
+/// by a third from hour to hour.
+const BESIDE_OTHERS: f64 = 3.0;
 
 /// Do something with a file of so many bytes, in the time that it may take.
 fn in_time<T>(what: &str, bytes: usize, work: impl FnOnce() -> T) -> T {

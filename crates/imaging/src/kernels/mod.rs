@@ -6,10 +6,12 @@
 //! | how it is simulated | `build` |
 //! | what is found so far, and stored | `nodes` |
 //! | how single wavelengths become a channel | `spectrum` |
+//! | sums of moved spectra in the widest registers | `part_sum` |
 
 mod bank;
 mod build;
 mod nodes;
+mod part_sum;
 mod spectrum;
 
 pub use bank::{BankSpec, KernelBank};

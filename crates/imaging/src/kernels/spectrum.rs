@@ -5,11 +5,10 @@
 //! [`metalith_wave::psf::polychromatic`]; in light of narrow bands it follows a cubic through four
 //! ([`metalith_sensor::Blend`]). Here the band is a sum over points 1 nm apart, which a pixel cannot tell from a line.
 
-use std::ops::Range;
-
 use metalith_sensor::ChannelPart;
-use num_complex::Complex32;
+use num_complex::{Complex32, Complex64};
 
+use super::part_sum::{SplitSpectrum, add_part};
 use crate::spectra::SceneSpectrum;
 use metalith_wave::kernels::{FftScratch, SquareFft};
 
@@ -23,8 +22,8 @@ pub(crate) struct SpectrumPlan {
     fft: SquareFft,
 }
 
-/// The spectrum of the PSF of one wavelength on quarters of pixels, the chief ray in the middle.
-pub(crate) struct PsfSpectrum(Vec<Complex32>);
+/// Columns of frequencies that all parts are added to before the next ones: they and their spectra stay in the cache.
+const COLUMNS: usize = 4;
 
 /// A part of a channel, as it acts in one direction.
 #[derive(Clone, Debug)]
@@ -67,7 +66,7 @@ impl SpectrumPlan {
     }
 
     /// Spectrum of the energies in quarters of the pixels of a window, row by row, its chief ray in the middle.
-    pub(crate) fn spectrum(&self, quarters: &[f32], scratch: &mut FftScratch) -> PsfSpectrum {
+    pub(crate) fn spectrum(&self, quarters: &[f32], scratch: &mut FftScratch) -> SplitSpectrum {
         let (inner, size) = (self.window * QUARTERS, self.fft.size());
         let from = (size - inner) / 2;
         let mut square = vec![0.0; size * size];
@@ -76,7 +75,7 @@ impl SpectrumPlan {
         }
         let mut spectrum = vec![Complex32::ZERO; self.fft.entries()];
         self.fft.forward(&mut square, size, &mut spectrum, scratch);
-        PsfSpectrum(spectrum)
+        SplitSpectrum::of(&spectrum, size)
     }
 
     /// Kernels of a channel for each spectrum of the scene: energy in a pixel whose middle is at
@@ -84,44 +83,33 @@ impl SpectrumPlan {
     /// sum over points half a pixel apart; see [`PlacedPixel`].
     pub(crate) fn kernels(
         &self,
-        spectra: &[PsfSpectrum],
+        spectra: &[SplitSpectrum],
         parts: &[MovedPart],
         basis: &[SceneSpectrum],
         scratch: &mut FftScratch,
     ) -> Vec<Vec<f32>> {
-        let (size, half) = (self.fft.size(), self.fft.size() / 2 + 1);
-        let mut sums = vec![vec![Complex32::ZERO; self.fft.entries()]; basis.len()];
+        let size = self.fft.size();
+        let columns = size / 2 + 1;
         let weakest = WEAKEST * parts.iter().map(|p| p.weight).fold(0.0, f64::max);
-        let mut mixed = vec![Complex32::ZERO; size];
-        for part in parts.iter().filter(|p| p.weight > weakest && p.inside(self.window)) {
-            let terms: Vec<(&[Complex32], f32)> = part
-                .blended
-                .iter()
-                .map(|(i, weight)| (&spectra[*i].0[..], *weight as f32))
-                .collect();
-            let turn = |axis: usize, k: usize| {
-                let signed = if 2 * k > size { k as f64 - size as f64 } else { k as f64 };
-                let turns = signed / size as f64 * part.offset[axis] * QUARTERS as f64;
-                let turn = num_complex::Complex64::cis(-std::f64::consts::TAU * turns);
-                Complex32::new(turn.re as f32, turn.im as f32)
-            };
-            let along_y: Vec<Complex32> = (0..size).map(|k| turn(1, k)).collect();
-            let weights: Vec<f32> = basis.iter().map(|b| (part.weight * b.at(part.nm)) as f32).collect();
-            for kx in 0..half {
-                let x = turn(0, kx);
-                let at = kx * size..(kx + 1) * size;
-                blend(&terms, at.clone(), &mut mixed);
-                mixed.iter_mut().zip(&along_y).for_each(|(m, y)| *m *= x * y);
-                for (sum, weight) in sums.iter_mut().zip(&weights) {
-                    for (s, m) in sum[at.clone()].iter_mut().zip(&mixed) {
-                        *s += m * weight;
-                    }
-                }
+        let strong = parts.iter().filter(|p| p.weight > weakest && p.inside(self.window));
+        let moved: Vec<MovedSum> = strong.map(|part| MovedSum::new(part, basis, size)).collect();
+        let mut sums = vec![SplitSpectrum::zero(columns, size); basis.len()];
+        for first in (0..columns).step_by(COLUMNS) {
+            let at = first..(first + COLUMNS).min(columns);
+            for part in &moved {
+                let terms: Vec<_> = part.blended.iter().map(|(i, weight)| (&spectra[*i], *weight)).collect();
+                add_part(
+                    &terms,
+                    at.clone(),
+                    [&part.along_x, &part.along_y],
+                    &part.weights,
+                    &mut sums,
+                );
             }
         }
         let mut square = vec![0.0; size * size];
-        let finished = sums.iter_mut().map(|sum| {
-            self.fft.inverse(sum, &mut square, size, scratch);
+        let finished = sums.into_iter().map(|sum| {
+            self.fft.inverse(&mut sum.joined(), &mut square, size, scratch);
             self.pixels(&square)
         });
         finished.collect()
@@ -197,31 +185,42 @@ fn convolved(a: &[f32], b: &[f32]) -> Vec<f32> {
     out
 }
 
-/// The weighted sum of spectra in a range of their frequencies.
-fn blend(terms: &[(&[Complex32], f32)], at: Range<usize>, out: &mut [Complex32]) {
-    let row = |k: usize| (&terms[k].0[at.clone()], terms[k].1);
-    match terms.len() {
-        2 => {
-            let ((from, _), (to, upper)) = (row(0), row(1));
-            let pairs = from.iter().zip(to);
-            out.iter_mut()
-                .zip(pairs)
-                .for_each(|(o, (a, b))| *o = a + (b - a) * upper);
-        }
-        4 => {
-            let [(a, p), (b, q), (c, r), (d, s)] = [0, 1, 2, 3].map(row);
-            let all = a.iter().zip(b).zip(c.iter().zip(d));
-            out.iter_mut()
-                .zip(all)
-                .for_each(|(o, ((a, b), (c, d)))| *o = a * p + b * q + c * r + d * s);
-        }
-        n => {
-            out.fill(Complex32::ZERO);
-            for (spectrum, weight) in (0..n).map(row) {
-                out.iter_mut().zip(spectrum).for_each(|(o, v)| *o += v * weight);
-            }
+/// A part of a channel as it is added to the spectra of the kernels.
+struct MovedSum {
+    /// Wavelengths with their weights.
+    blended: Vec<(usize, f32)>,
+    /// Turns of the phase of frequencies along x and along y, by which its chief ray moves.
+    along_x: Vec<Complex32>,
+    along_y: Vec<Complex32>,
+    /// Weight in the kernel of each spectrum of the scene.
+    weights: Vec<f32>,
+}
+
+impl MovedSum {
+    fn new(part: &MovedPart, basis: &[SceneSpectrum], size: usize) -> Self {
+        let along = |axis: usize| turns(size, part.offset[axis] * QUARTERS as f64);
+        Self {
+            blended: part.blended.iter().map(|(i, weight)| (*i, *weight as f32)).collect(),
+            along_x: along(0),
+            along_y: along(1),
+            weights: basis.iter().map(|b| (part.weight * b.at(part.nm)) as f32).collect(),
         }
     }
+}
+
+/// Turns of the phase of the frequencies of `size` samples, those of negative frequencies behind the others, by which what they add
+/// up to moves by some samples.
+fn turns(size: usize, samples: f64) -> Vec<Complex32> {
+    let step = Complex64::cis(-std::f64::consts::TAU * samples / size as f64);
+    let mut turns = vec![Complex32::ONE; size];
+    let mut turn = Complex64::ONE;
+    for k in 1..=size / 2 {
+        turn *= step;
+        let single = Complex32::new(turn.re as f32, turn.im as f32);
+        turns[size - k] = single.conj();
+        turns[k] = single;
+    }
+    turns
 }
 
 /// Parts with a smaller share of the strongest are left out.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use metalith_core::{LayerNumber, Progress, Result};
 use metalith_design::array::{DomainPart, SymmetryGroup};
 use metalith_oasis::{CellBounds, CompressedBlock, Placing, RecordBuffer, Repetition};
-use metalith_pillars::PillarRows;
+use metalith_pillars::{PillarRows, RowExtent};
 use rayon::prelude::*;
 
 use super::super::pillar_form::PillarForm;
@@ -218,12 +218,9 @@ impl<'a> ElementPillars<'a> {
         let extents = (0..n).map(|iy| {
             let runs = self.runs.iter().flat_map(|rows| rows[iy].clone());
             runs.fold(None, |extent: Option<(usize, usize)>, run| {
-                let row = self.widths.occupied(iy, run.clone(), &mut room);
-                let Some(first) = row.iter().position(|&w| w != 0) else {
+                let Some(RowExtent { first, last, .. }) = self.widths.extent(iy, run, &mut room) else {
                     return extent;
                 };
-                let last = row.iter().rposition(|&w| w != 0).unwrap_or(first);
-                let (first, last) = (run.start + first, run.start + last);
                 Some(extent.map_or((first, last), |(l, r)| (l.min(first), r.max(last))))
             })
         });

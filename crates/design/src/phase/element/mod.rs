@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::{PhaseTerm, RadialPhase};
@@ -164,10 +165,37 @@ impl LensPhase {
 
     /// Phase over the radius at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
+        self.holds(ix, iy).then(|| self.turns_inside(ix, iy))
+    }
+
+    /// Variant of [`LensPhase::turns`] for a site that is known to be inside the lens.
+    #[inline]
+    fn turns_inside(&self, ix: usize, iy: usize) -> f64 {
         let r2 = self.lattice.units2(ix, iy);
-        self.holds(ix, iy).then(|| match &self.turns {
+        match &self.turns {
             PhaseOfRadius::Tabulated(turns) => turns[((r2 - self.offset) >> self.stride_log2) as usize],
             PhaseOfRadius::Computed(radial) => radial.turns(radius2_um2(self.lattice, r2)),
+        }
+    }
+
+    /// Columns of a row that are inside the lens, in closed form: of a round lens on a square lattice. None of any other, whose sites are
+    /// asked one by one.
+    fn columns(&self, iy: usize) -> Option<Range<usize>> {
+        if self.outline.is_some() || !self.lattice.is_square() {
+            return None;
+        }
+        // In half pitches from the middle, in steps of two.
+        let last = self.lattice.sites() as i64 - 1;
+        let y = self.lattice.half_index(iy);
+        let Some(reach) = (self.limit - y * y).checked_isqrt() else {
+            return Some(0..0);
+        };
+        let reach = reach.min(last);
+        let reach = reach - ((reach ^ last) & 1);
+        Some(if reach < 0 {
+            0..0
+        } else {
+            ((last - reach) / 2) as usize..((last + reach) / 2 + 1) as usize
         })
     }
 
@@ -270,25 +298,37 @@ impl<'a> ElementPhase<'a> {
         self.lens.holds(ix, iy)
     }
 
+    /// Columns of a row that are inside the lens, where they are known without a look at each site.
+    pub(crate) fn columns(&self, iy: usize) -> Option<Range<usize>> {
+        self.lens.columns(iy)
+    }
+
     /// Phase at a site (turns), not reduced; none outside the lens.
     pub fn turns(&self, ix: usize, iy: usize) -> Option<f64> {
-        let steered = self.steered(ix, iy)?;
+        self.holds(ix, iy).then(|| self.turns_inside(ix, iy))
+    }
+
+    /// Variant of [`ElementPhase::turns`] for a site that is known to be inside the lens.
+    #[inline]
+    fn turns_inside(&self, ix: usize, iy: usize) -> f64 {
+        let steered = self.steered(ix, iy);
         if self.terms.is_empty() {
-            return Some(steered);
+            return steered;
         }
         let (x_um, y_um) = self.place_of_terms(ix, iy);
-        Some(
-            self.terms
-                .iter()
-                .fold(steered, |sum, term| sum + term.turns(x_um, y_um)),
-        )
+        self.terms
+            .iter()
+            .fold(steered, |sum, term| sum + term.turns(x_um, y_um))
     }
 
     /// Phase in two parts (waves) whose sum it is, but for rounding: the part that is known exactly, and the sum of
     /// maps that are known up to whole waves. From site to site the second may jump by whole waves that the map does
     /// not mean.
     pub fn parts(&self, ix: usize, iy: usize) -> Option<[f64; 2]> {
-        let mut parts = [self.steered(ix, iy)?, 0.0];
+        if !self.holds(ix, iy) {
+            return None;
+        }
+        let mut parts = [self.steered(ix, iy), 0.0];
         if !self.terms.is_empty() {
             let (x_um, y_um) = self.place_of_terms(ix, iy);
             for term in &self.terms {
@@ -298,15 +338,16 @@ impl<'a> ElementPhase<'a> {
         Some(parts)
     }
 
-    /// Phase of the lens and its wedge at a site (turns), not reduced.
-    fn steered(&self, ix: usize, iy: usize) -> Option<f64> {
-        let radial = self.lens.turns(ix, iy)?;
+    /// Phase of the lens and its wedge at a site inside the lens (turns), not reduced.
+    #[inline]
+    fn steered(&self, ix: usize, iy: usize) -> f64 {
+        let radial = self.lens.turns_inside(ix, iy);
         let (x, y) = (
             self.lens.lattice.half_index(ix) as f64,
             self.lens.lattice.half_index(iy) as f64,
         );
         // The two parts of the wedge are added first: exchanging x and y then gives the same sum.
-        Some(radial + (x * self.step.0 + y * self.step.1))
+        radial + (x * self.step.0 + y * self.step.1)
     }
 
     /// Place at which phases over the plane are evaluated for a site, from the middle of the element before it was
@@ -318,11 +359,16 @@ impl<'a> ElementPhase<'a> {
 
     /// Phase at a site modulo one turn, in [0, 1); none outside the lens.
     pub fn wrapped(&self, ix: usize, iy: usize) -> Option<f64> {
-        self.turns(ix, iy).map(|turns| {
-            let u = turns - floor(turns);
-            // A tiny negative phase rounds up to one whole turn.
-            if u < 1.0 { u } else { 0.0 }
-        })
+        self.holds(ix, iy).then(|| self.wrapped_inside(ix, iy))
+    }
+
+    /// Variant of [`ElementPhase::wrapped`] for a site that is known to be inside the lens.
+    #[inline]
+    pub(crate) fn wrapped_inside(&self, ix: usize, iy: usize) -> f64 {
+        let turns = self.turns_inside(ix, iy);
+        let u = turns - floor(turns);
+        // A tiny negative phase rounds up to one whole turn.
+        if u < 1.0 { u } else { 0.0 }
     }
 
     /// Phases modulo one turn of consecutive sites from a distance to the middle (um) on; the direction is along an axis or a diagonal, where
