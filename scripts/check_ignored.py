@@ -34,8 +34,6 @@ FULL = {
     "designs_of_a_grid_are_each_judged_by_their_own_layout_and_tables",
     "shards_are_whole_are_of_one_plan_and_are_counted",
     "a_limit_on_no_figure_is_told",
-    "pictures_are_figures_of_a_draw",
-    "shards_by_processes_are_those_of_one_process",
     # Chips as fabricated.
     "real_pillars_between_the_nodes_are_those_solved_exactly",
     # The library of a cell.

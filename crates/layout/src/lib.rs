@@ -128,7 +128,7 @@ impl<'a> PillarLayout<'a> {
         path: &Path,
         progress: &dyn Progress,
     ) -> Result<Written> {
-        progress.begin("writing pillars", array.pillars());
+        progress.begin("writing pillars", pillars_in_file(array, hierarchy));
         match format {
             LayoutFormat::Gds => self.write_gds(array, hierarchy, path, progress),
             LayoutFormat::Oasis(encoding) => oasis::write_pillars(self, array, hierarchy, encoding, path, progress),
@@ -164,6 +164,15 @@ impl<'a> PillarLayout<'a> {
             beside: Vec::new(),
         })
     }
+}
+
+/// Pillars that a layout of this hierarchy has records of: folded layouts have those alone that symmetry leaves unique.
+fn pillars_in_file(array: &PillarArray, hierarchy: Hierarchy) -> u64 {
+    if hierarchy != Hierarchy::Folded {
+        return array.pillars();
+    }
+    let parts = array.classes.iter().flat_map(|class| class.group.domain(&class.widths));
+    parts.map(|part| part.pillars).sum()
 }
 
 /// Remark for people if nothing could be copied.

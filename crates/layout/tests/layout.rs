@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
-use metalith_core::{AtomicFile, Silent};
+use metalith_core::{AtomicFile, Progress, Silent};
 use metalith_design::array::ClassPillars;
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_gds::{LayerNumber, Layout, LayoutError, Limit, Point, ReadLimits, Selection, Shape, Transform, Visitor};
@@ -146,6 +147,39 @@ fn the_same_bytes_on_any_number_of_threads() {
     };
     let one = on(1);
     assert!(one == on(2) && one == on(5));
+}
+
+/// Steps that were promised, less those that were reported.
+#[derive(Default)]
+struct StepsLeft(AtomicU64);
+
+impl Progress for StepsLeft {
+    fn begin(&self, _what: &str, steps: u64) {
+        self.0.store(steps, Ordering::Relaxed);
+    }
+
+    fn advance(&self, steps: u64) {
+        self.0.fetch_sub(steps, Ordering::Relaxed);
+    }
+}
+
+/// The time that is left of a folded layout was eight times too long: it has an eighth of its pillars.
+#[test]
+fn progress_ends_with_the_last_pillar_that_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["mini_3x3", "hexagonal_1550"] {
+        let design = Design::read(&design(name)).unwrap();
+        let array = PillarArray::build(&design, &Silent).unwrap();
+        let encodings =
+            [OasisEncoding::Compact, OasisEncoding::Plain, OasisEncoding::Smallest].map(LayoutFormat::Oasis);
+        for (hierarchy, of) in HIERARCHIES {
+            for format in [LayoutFormat::Gds].into_iter().chain(encodings) {
+                let left = StepsLeft::default();
+                write_pillars_as(&design, &array, of, format, &folder.path().join("pillars"), &left).unwrap();
+                assert_eq!(left.0.load(Ordering::Relaxed), 0, "{name}, {hierarchy}, {format:?}");
+            }
+        }
+    }
 }
 
 #[test]

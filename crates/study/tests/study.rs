@@ -318,7 +318,7 @@ const INTERPOLATED_DB: f64 = 0.05;
 /// The picture of a chip without faults is that of `metalith picture`; a chip that is 30 % out of focus loses more if its
 /// restoration does not know it.
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn pictures_are_figures_of_a_draw() {
     let folder = tempfile::tempdir().unwrap();
     let path = tolerance(folder.path(), 1);
