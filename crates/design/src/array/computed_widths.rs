@@ -44,6 +44,11 @@ impl ComputedWidths {
         }
     }
 
+    /// The pillars as a map, made on all threads.
+    pub(super) fn map(&self) -> PillarMap {
+        self.rule.widths(&self.phase(), self.phase_along_y().as_ref())
+    }
+
     fn phase(&self) -> ElementPhase<'_> {
         ElementPhase::of(&self.lens, &self.element)
     }

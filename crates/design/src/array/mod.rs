@@ -13,7 +13,7 @@ pub use fundamental_domain::DomainPart;
 pub use pillar_rule::PillarRule;
 pub use symmetry::{Symmetry, SymmetryGroup};
 
-use crate::phase::{ElementPhase, LensPhase};
+use crate::phase::LensPhase;
 use crate::{Design, Element};
 use metalith_core::{Error, Result};
 use metalith_core::{Progress, Wedge};
@@ -41,7 +41,7 @@ pub struct Class {
     /// Pillars of the first element of the class.
     pub widths: ClassPillars,
     /// The symmetries of those pillars: each proven by comparing every site, or, of an element that is not held, by its
-    /// phase.
+    /// phase. Copies are proven by the phases of both where these suffice, else by comparing every site.
     pub group: SymmetryGroup,
 }
 
@@ -147,18 +147,25 @@ impl PillarArray {
             placed: Vec::new(),
             compensated: false,
         };
+        // Of each class, the element that it is of.
+        let mut firsts: Vec<ComputedWidths> = Vec::new();
         for element in elements {
             progress.check_stopped()?;
             let rule = Arc::new(PillarRule::of_element(design, element.index));
-            array.place(
-                element,
-                if held {
-                    let along_y = along_y.as_ref().map(|y| ElementPhase::of(y, &element));
-                    ClassPillars::Held(rule.widths(&ElementPhase::of(&lens, &element), along_y.as_ref()))
-                } else {
-                    ClassPillars::Computed(ComputedWidths::new(lens.clone(), along_y.clone(), rule, element))
-                },
-            );
+            let computed = ComputedWidths::new(lens.clone(), along_y.clone(), rule, element);
+            // Where the phases of two elements say that they are copies, no pillar is made to see it.
+            match array.copy(|class, symmetry| firsts[class].maps(symmetry, &computed)) {
+                Some((class, symmetry)) => array.placed.push(PlacedElement {
+                    element,
+                    class,
+                    symmetry,
+                }),
+                None if held => array.place(element, ClassPillars::Held(computed.map())),
+                None => array.place(element, ClassPillars::Computed(computed.clone())),
+            }
+            if firsts.len() < array.classes.len() {
+                firsts.push(computed);
+            }
             progress.advance(1);
         }
         Ok(array)
@@ -218,12 +225,16 @@ impl PillarArray {
         }
     }
 
-    fn place(&mut self, element: Element, widths: ClassPillars) {
-        let copy = self.classes.iter().enumerate().find_map(|(class, known)| {
+    /// The first class that an element is a copy of, and the first symmetry that turns it into the element.
+    fn copy(&self, is_copy: impl Fn(usize, Symmetry) -> bool) -> Option<(usize, Symmetry)> {
+        (0..self.classes.len()).find_map(|class| {
             let mut kept = Symmetry::ALL.into_iter().filter(|s| s.keeps(self.shape));
-            let symmetry = kept.find(|s| widths.is_copy(*s, &known.widths))?;
-            Some((class, symmetry))
-        });
+            Some((class, kept.find(|s| is_copy(class, *s))?))
+        })
+    }
+
+    fn place(&mut self, element: Element, widths: ClassPillars) {
+        let copy = self.copy(|class, symmetry| widths.is_copy(symmetry, &self.classes[class].widths));
         let (class, symmetry) = copy.unwrap_or_else(|| {
             let group = widths.group(self.shape);
             self.classes.push(Class { widths, group });
@@ -234,5 +245,40 @@ impl PillarArray {
             class,
             symmetry,
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::phase::ElementPhase;
+    use metalith_core::Silent;
+
+    /// Elements whose phases say that they are copies have the pillars that they have by themselves.
+    #[test]
+    fn copies_have_the_pillars_of_their_own_phase() {
+        let designs = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs"));
+        for (name, classes) in [
+            ("mini_3x3", 3),
+            ("array_2x4", 2),
+            ("mixed_lenses", 4),
+            ("hexagonal_1550", 1),
+            ("birefringent_532", 1),
+        ] {
+            let design = Design::read(&designs.join(format!("{name}.toml"))).unwrap();
+            let array = PillarArray::build(&design, &Silent).unwrap();
+            let lens = LensPhase::of(&design);
+            let along_y = design.along_y().map(|y| LensPhase::of(&y));
+            for placed in &array.placed {
+                let element = &placed.element;
+                let y = along_y.as_ref().map(|y| ElementPhase::of(y, element));
+                let own = PillarRule::of_element(&design, element.index);
+                let own = own.widths(&ElementPhase::of(&lens, element), y.as_ref());
+                assert_eq!(*array.widths(placed), own, "{name} {}", element.label());
+            }
+            assert_eq!(array.classes.len(), classes, "{name}");
+        }
     }
 }
