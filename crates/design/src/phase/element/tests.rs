@@ -24,7 +24,7 @@ fn a_computed_phase_is_the_tabulated_one() {
         wavelength_um: 0.55,
         focal_length_um: 30.0,
     };
-    for diameter_nm in [300, 700, 20_000, 20_400] {
+    for diameter_nm in [20_000, 20_400] {
         let lattice = Lattice::covering(diameter_nm, 350).unwrap();
         let table = LensPhase::new(lattice, diameter_nm, &radial);
         let computed = LensPhase::with_entries(lattice, diameter_nm, &radial, 0);
@@ -33,7 +33,24 @@ fn a_computed_phase_is_the_tabulated_one() {
         for (ix, iy) in (0..n * n).map(|k| (k % n, k / n)) {
             assert_eq!(table.turns(ix, iy), computed.turns(ix, iy));
             assert_eq!(table.holds(ix, iy), table.turns(ix, iy).is_some());
-            assert_eq!(table.holds(ix, iy), table.columns(iy).unwrap().contains(&ix));
+        }
+    }
+}
+
+/// Columns in closed form are the sites that are asked one by one, of lenses without a site too.
+#[test]
+fn columns_of_a_row_are_its_sites_inside() {
+    for diameter_nm in [300, 360, 700, 1_000, 20_000, 20_400] {
+        let lattice = Lattice::covering(diameter_nm, 350).unwrap();
+        let lens = LensPhase::new(lattice, diameter_nm, &RadialPhase::Flat);
+        let n = lattice.sites();
+        for iy in 0..n {
+            let inside: Vec<usize> = (0..n).filter(|&ix| lens.holds(ix, iy)).collect();
+            assert_eq!(
+                lens.columns(iy).unwrap().collect::<Vec<_>>(),
+                inside,
+                "{diameter_nm} nm, row {iy}"
+            );
         }
     }
 }
