@@ -2,21 +2,30 @@
 
 use std::ops::Range;
 
+use crate::packed_numbers::PackedNumbers;
 use crate::{Lattice, PillarRows};
 
-/// Sites along the side of a tile of 2 kB: whoever goes along a row meets each memory page of it once, not one at every
+/// Sites along the side of a tile of 1 or 2 kB: whoever goes along a row meets each memory page of it once, not one at every
 /// site beyond the diagonal.
 const TILE: usize = 32;
 
-/// Pillar widths of one element, one for each set of sites that mirrors and quarter turns take into one another: an
-/// eighth of the memory of a [`PillarMap`](crate::PillarMap).
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Pillars of one element, one for each set of sites that mirrors and quarter turns take into one another: a sixteenth of the
+/// memory of a [`PillarMap`](crate::PillarMap) where no more than 255 numbers differ, else an eighth.
+#[derive(Clone, Debug)]
 pub struct EighthMap {
     lattice: Lattice,
     /// The triangle 0 <= b <= a, where a and b are the larger and the smaller distance of a site from the axes, in sites:
     /// row after row of tiles, each of them row by row.
-    width_nm: Vec<u16>,
+    numbers: PackedNumbers,
 }
+
+impl PartialEq for EighthMap {
+    fn eq(&self, other: &Self) -> bool {
+        self.lattice == other.lattice && self.numbers.iter().eq(other.numbers.iter())
+    }
+}
+
+impl Eq for EighthMap {}
 
 impl EighthMap {
     /// Widths that are held for a lattice.
@@ -36,8 +45,13 @@ impl EighthMap {
     pub fn empty(lattice: Lattice) -> Self {
         Self {
             lattice,
-            width_nm: vec![0; Self::sites(lattice) as usize],
+            numbers: PackedNumbers::zero(Self::sites(lattice) as usize),
         }
+    }
+
+    /// Bytes of a site: one, or two where more than 255 numbers differ.
+    pub fn bytes_of_site(&self) -> u64 {
+        self.numbers.bytes_of_one()
     }
 
     /// The pillars of an element that all eight symmetries leave as it is.
@@ -47,7 +61,7 @@ impl EighthMap {
         for iy in n / 2..n {
             // Up to the diagonal, which is at the same column as row.
             for (ix, &width) in ((n / 2)..=iy).zip(rows.row(iy, n / 2..iy + 1, &mut room)) {
-                *map.at(ix, iy) = width;
+                map.set(ix, iy, width);
             }
         }
         map
@@ -67,11 +81,11 @@ impl EighthMap {
         Self::index(x.max(y), x.min(y))
     }
 
-    /// Width (nm) at a site and all its copies.
+    /// Put a number on a site and all its copies.
     #[inline]
-    pub fn at(&mut self, ix: usize, iy: usize) -> &mut u16 {
+    pub fn set(&mut self, ix: usize, iy: usize, number: u16) {
         let place = self.place(ix, iy);
-        &mut self.width_nm[place]
+        self.numbers.set(place, number);
     }
 
     /// Number of sites that symmetry takes a site to, itself included: 8, 4 on an axis or a diagonal, 1 in the middle.
@@ -101,8 +115,7 @@ impl EighthMap {
     #[inline]
     fn along(&self, y: usize, row: &mut [u16]) {
         for (k, part) in row.chunks_mut(TILE).enumerate() {
-            let start = Self::index(y, k * TILE);
-            part.copy_from_slice(&self.width_nm[start..start + part.len()]);
+            self.numbers.copy(Self::index(y, k * TILE), 1, part);
         }
     }
 }
@@ -113,7 +126,7 @@ impl PillarRows for EighthMap {
     }
 
     fn number(&self, ix: usize, iy: usize) -> u16 {
-        self.width_nm[self.place(ix, iy)]
+        self.numbers.get(self.place(ix, iy))
     }
 
     fn row<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
@@ -125,13 +138,12 @@ impl PillarRows for EighthMap {
         let right = &mut room[n / 2..];
         let (along, beyond) = right.split_at_mut(y + 1);
         self.along(y, along);
-        let mut x = y + 1;
-        let mut beyond = beyond.iter_mut();
-        while x < n.div_ceil(2) {
-            let (start, rows) = (Self::index(x, y), TILE - x % TILE);
-            let column = self.width_nm[start..].iter().step_by(TILE).take(rows);
-            column.zip(beyond.by_ref()).for_each(|(from, to)| *to = *from);
-            x += rows;
+        let (mut x, mut beyond) = (y + 1, beyond);
+        while !beyond.is_empty() {
+            let rows = (TILE - x % TILE).min(beyond.len());
+            let (part, rest) = beyond.split_at_mut(rows);
+            self.numbers.copy(Self::index(x, y), TILE, part);
+            (x, beyond) = (x + rows, rest);
         }
         let (left, right) = room.split_at_mut(n / 2);
         let mirrored = right.iter().skip(n % 2);
@@ -149,7 +161,7 @@ impl PillarRows for EighthMap {
         let half = self.lattice.sites().div_ceil(2);
         for a in 0..half {
             for b in 0..=a {
-                let w = usize::from(self.width_nm[Self::index(a, b)]);
+                let w = usize::from(self.numbers.get(Self::index(a, b)));
                 if w >= counts.len() {
                     counts.resize(w + 1, 0);
                 }
@@ -179,7 +191,7 @@ mod tests {
             for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
                 let radius = lattice.half_radius2(ix, iy) as u16;
                 let width = if radius.is_multiple_of(5) { 0 } else { radius };
-                *eighth.at(ix, iy) = width;
+                eighth.set(ix, iy, width);
                 whole.number[[iy, ix]] = width;
                 let copies = (0..n * n)
                     .map(|k| [lattice.half_index(k % n).abs(), lattice.half_index(k / n).abs()])

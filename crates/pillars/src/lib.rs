@@ -6,6 +6,7 @@ mod element_site;
 mod kind;
 mod lattice;
 mod mixed;
+mod packed_numbers;
 mod pillar_check;
 mod pillar_map;
 mod pitch;

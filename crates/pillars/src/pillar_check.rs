@@ -139,8 +139,8 @@ mod tests {
             let (mut intended, mut found) = (EighthMap::empty(lattice), EighthMap::empty(lattice));
             for (iy, ix) in (0..n * n).map(|k| (k / n, k % n)) {
                 let radius2 = lattice.half_radius2(ix, iy) as u16;
-                *intended.at(ix, iy) = if radius2 % 7 == 1 { 0 } else { 100 + radius2 % 50 };
-                *found.at(ix, iy) = if radius2 % 5 == 1 { 0 } else { 100 + radius2 % 48 };
+                intended.set(ix, iy, if radius2 % 7 == 1 { 0 } else { 100 + radius2 % 50 });
+                found.set(ix, iy, if radius2 % 5 == 1 { 0 } else { 100 + radius2 % 48 });
             }
             let whole = PillarCheck::compare(&intended.whole(), &found.whole());
             assert_eq!(PillarCheck::compare_eighth(&intended, &found), whole);

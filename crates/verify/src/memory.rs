@@ -4,7 +4,7 @@ use std::path::Path;
 
 use metalith_core::Result;
 use metalith_design::{Design, Element, LensSpec};
-use metalith_gds::extract::{Holding, fits_folded, held_sites};
+use metalith_gds::extract::{Holding, fits_folded, held_bytes};
 use metalith_wave::{Accuracy, FoldedPropagator, Window};
 
 use super::{optics, polychromatic};
@@ -63,7 +63,7 @@ impl Simulation {
         }
         let spectra = largest_spectra_bytes(design, accuracy)? as f64;
         let threads = rayon::current_num_threads() as f64;
-        let held = BASE_MB * 1e6 + READ_BYTES * held_sites(&elements, &holdings) as f64;
+        let held = BASE_MB * 1e6 + held_bytes(&elements, &holdings) as f64;
         let needed = |part: f64| 1e-6 * (held + threads * (part + BESIDE_SPECTRA * spectra));
         let least_mb = needed(spectra / MOST_PARTS as f64);
         if least_mb > memory_mb {

@@ -22,7 +22,7 @@ use metalith_pillars::{EighthMap, Lattice, PillarMap, PillarRows, PillarShape};
 /// Sites of an element that is held (128 MB): one of 2.8 mm. The pillars of a larger one are made as they are asked for.
 const MOST_HELD: u64 = 1 << 26;
 
-/// Widths of an eighth of an element that is held to be read whole (268 MB): one of 11 mm.
+/// Sites of an eighth of an element that is held to be read whole (134 MB, 268 MB where many widths differ): one of 11 mm.
 const MOST_EIGHTH: u64 = 1 << 27;
 
 /// Places of elements without a design (nm): layouts have 32 bits for them.

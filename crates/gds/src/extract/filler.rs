@@ -6,12 +6,12 @@ use std::collections::HashMap;
 
 use copies::Images;
 
-use super::MOST_SITES;
 use super::places::PlaceFit;
 use super::plan::ExtractedElement;
 use super::sites::{Scale, SitePlace, Sites};
 use super::stored_pillars::StoredPillars;
 use super::unrecognised_shapes::Why;
+use super::{MOST_BYTES, WHOLE_SITE_BYTES, too_many_sites};
 use crate::{DrawnPillar, ExtractionError, Rect, Transform};
 use metalith_pillars::{EighthMap, ElementSite, PillarRows};
 
@@ -34,8 +34,8 @@ pub struct Filler {
     /// The first placement that these were found with.
     first: Transform,
     pillars: u64,
+    /// Memory of the sites that are held, and of those that may be (bytes).
     held: u64,
-    /// Sites that may be held.
     most: u64,
     /// More is to be held than may be.
     refused: bool,
@@ -69,7 +69,7 @@ impl Filler {
             first: Transform::IDENTITY,
             pillars: 0,
             held: 0,
-            most: MOST_SITES,
+            most: MOST_BYTES,
             refused: false,
             tolerant: false,
             rounded: 0,
@@ -97,7 +97,7 @@ impl Filler {
         self.rounded
     }
 
-    /// This filler, which may hold this many sites.
+    /// This filler, which may hold sites of this much memory (bytes).
     #[must_use]
     pub fn holding(mut self, most: u64) -> Self {
         self.most = most;
@@ -117,15 +117,7 @@ impl Filler {
         if !self.refused {
             return Ok(self.elements);
         }
-        Err(ExtractionError::Sites {
-            elements: self.elements.len(),
-            sites: self
-                .elements
-                .iter()
-                .map(|e| (e.site.lattice.sites() as u64).pow(2))
-                .sum(),
-            most: self.most,
-        })
+        Err(too_many_sites(self.elements.iter().map(|e| &e.site), self.most))
     }
 
     /// A cell with these placements begins.
@@ -213,7 +205,12 @@ impl Filler {
             for (orbit, &(row, column, width_nm)) in self.orbits.iter().zip(&sites) {
                 let copies = orbit.placements.len() as u64;
                 if let StoredPillars::Eighth(map) = &mut self.elements[orbit.element as usize].widths {
-                    *map.at(column, row) = width_nm;
+                    let before = map.bytes_of_site();
+                    map.set(column, row, width_nm);
+                    if map.bytes_of_site() != before {
+                        self.held += EighthMap::sites(map.lattice());
+                        self.refused |= self.held > self.most;
+                    }
                     self.pillars += copies;
                     self.rounded += if is_rounded { copies } else { 0 };
                 }
@@ -392,8 +389,8 @@ impl Filler {
     #[cold]
     fn hold_whole(&mut self, element: u32) {
         let widths = &mut self.elements[element as usize].widths;
-        let sites = (widths.lattice().sites() as u64).pow(2);
-        let held = self.held - widths.sites() + sites;
+        let bytes = WHOLE_SITE_BYTES * (widths.lattice().sites() as u64).pow(2);
+        let held = self.held - widths.bytes() + bytes;
         self.refused |= held > self.most;
         if !self.refused {
             self.held = held;

@@ -43,19 +43,20 @@ pub(crate) use plan::turned;
 pub use sites::Scale;
 pub use stored_pillars::StoredPillars;
 
-/// Sites of all elements together where they are held in full, or where the layout says how large they are: 5 x 5 lenses
-/// of 1 mm have 204 million.
-const MOST_SITES: u64 = 1 << 28;
-/// Sites that are held of elements that a design gives (4.3 GB): a steered lens of 10 mm has 816 million, an eighth of one of
-/// 30 mm 919 million.
-const MOST_GIVEN_SITES: u64 = 1 << 31;
+/// Memory of the sites of all elements where the layout says how large they are (1.1 GB): 5 x 5 lenses of 1 mm, two bytes a site, take
+/// 408 MB, an eighth of a lens of 30 mm, a byte a site, 919 MB.
+const MOST_BYTES: u64 = 1 << 30;
+/// Memory of the sites of elements that a design gives (4.3 GB): a steered lens of 10 mm takes 1.6 GB.
+const MOST_GIVEN_BYTES: u64 = 1 << 32;
+/// Memory of a site of an element that is held in full (bytes).
+const WHOLE_SITE_BYTES: u64 = 2;
 
 /// Checks that the lattices of these elements can be held, before the layout at `path` is read.
 ///
 /// # Errors
 /// [`ExtractionError::Sites`] if they have too many sites together.
 pub fn fits(path: &Path, elements: &[ElementSite]) -> Result<()> {
-    fits_within(path, elements, &vec![Holding::Whole; elements.len()], MOST_SITES)
+    fits_within(path, elements, &vec![Holding::Whole; elements.len()], MOST_BYTES)
 }
 
 /// Way in which an element is held.
@@ -67,10 +68,10 @@ pub enum Holding {
     Eighth,
 }
 
-/// Sites that are held of these elements of a design.
-pub fn held_sites(elements: &[ElementSite], holdings: &[Holding]) -> u64 {
+/// Memory of these elements of a design (bytes), of an eighth as long as it takes a byte a site.
+pub fn held_bytes(elements: &[ElementSite], holdings: &[Holding]) -> u64 {
     let held = |(e, holding): (&ElementSite, &Holding)| match holding {
-        Holding::Whole => (e.lattice.sites() as u64).pow(2),
+        Holding::Whole => WHOLE_SITE_BYTES * (e.lattice.sites() as u64).pow(2),
         Holding::Eighth => EighthMap::sites(e.lattice),
     };
     elements.iter().zip(holdings).map(held).sum()
@@ -81,19 +82,23 @@ pub fn held_sites(elements: &[ElementSite], holdings: &[Holding]) -> u64 {
 /// # Errors
 /// As [`fits`].
 pub fn fits_folded(path: &Path, elements: &[ElementSite], holdings: &[Holding]) -> Result<()> {
-    fits_within(path, elements, holdings, MOST_GIVEN_SITES)
+    fits_within(path, elements, holdings, MOST_GIVEN_BYTES)
 }
 
 fn fits_within(path: &Path, elements: &[ElementSite], holdings: &[Holding], most: u64) -> Result<()> {
-    let sites = held_sites(elements, holdings);
-    if sites <= most {
+    if held_bytes(elements, holdings) <= most {
         return Ok(());
     }
-    Err(failed(path)(ExtractionError::Sites {
+    Err(failed(path)(too_many_sites(elements.iter(), most)))
+}
+
+/// Error of elements that take more memory than this (bytes).
+fn too_many_sites<'e>(elements: impl ExactSizeIterator<Item = &'e ElementSite>, most: u64) -> ExtractionError {
+    ExtractionError::Sites {
         elements: elements.len(),
-        sites,
-        most,
-    }))
+        sites: elements.map(|e| (e.lattice.sites() as u64).pow(2)).sum(),
+        most: most / WHOLE_SITE_BYTES,
+    }
 }
 
 /// Error that says what is wrong with the layout at `path`.
@@ -160,7 +165,7 @@ impl PillarReader for PillarsAt {
 pub fn extract(layout: &Layout, plan: &ExtractionPlan, progress: &dyn Progress) -> Result<Extraction> {
     let found = sites_of(layout, plan, progress)?;
     fits(layout.path(), &found.sites)?;
-    let folded = extract_from(layout, plan, found, MOST_SITES, progress)?;
+    let folded = extract_from(layout, plan, found, MOST_BYTES, progress)?;
     let whole = |e: ExtractedElement<StoredPillars>| ExtractedElement {
         site: e.site,
         widths: e.widths.into_map(),
@@ -188,8 +193,8 @@ pub fn extract_folded(
 ) -> Result<Extraction<StoredPillars>> {
     let found = sites_of(layout, plan, progress)?;
     let most = match plan.elements {
-        Elements::Given(_) => MOST_GIVEN_SITES,
-        Elements::Discover => MOST_SITES,
+        Elements::Given(_) => MOST_GIVEN_BYTES,
+        Elements::Discover => MOST_BYTES,
     };
     extract_from(layout, plan, found, most, progress)
 }
@@ -238,7 +243,7 @@ pub(crate) fn recognise(
     progress: &dyn Progress,
 ) -> Result<Extraction<StoredPillars>> {
     ElementSite::widen(&mut found.sites);
-    extract_from(layout, plan, found, MOST_SITES, progress)
+    extract_from(layout, plan, found, MOST_BYTES, progress)
 }
 
 fn extract_from(

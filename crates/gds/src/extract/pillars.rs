@@ -30,7 +30,7 @@ pub(super) struct PillarCollector {
 }
 
 impl PillarCollector {
-    /// Holds `most` sites.
+    /// Holds sites of at most so many bytes.
     pub(crate) fn new(plan: &ExtractionPlan, found: Discovered, scale: Scale, most: u64) -> Self {
         let turned_deg = found.turned_deg();
         let Discovered { sites, shape, fits, .. } = found;

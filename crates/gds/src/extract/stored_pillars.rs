@@ -15,12 +15,12 @@ pub enum StoredPillars {
 }
 
 impl StoredPillars {
-    /// Sites that are held.
-    pub fn sites(&self) -> u64 {
+    /// Memory of the sites that are held (bytes).
+    pub fn bytes(&self) -> u64 {
         match self {
             Self::Empty(_) => 0,
-            Self::Eighth(map) => EighthMap::sites(map.lattice()),
-            Self::Whole(map) => map.number.len() as u64,
+            Self::Eighth(map) => map.bytes_of_site() * EighthMap::sites(map.lattice()),
+            Self::Whole(map) => 2 * map.number.len() as u64,
         }
     }
 
