@@ -4,6 +4,8 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use metalith_pillars::{EighthMap, Lattice, PillarMap, PillarRows, PillarShape, RowExtent};
 
 use super::{PillarRule, Symmetry, SymmetryGroup};
@@ -135,6 +137,41 @@ impl PillarRows for ComputedWidths {
         Self::fill(iy, columns, room, |ix, iy| u16::from(phase.holds(ix, iy)))
     }
 
+    /// Rows are counted on all threads; of an element with all eight symmetries an eighth is.
+    fn histogram(&self) -> Vec<u64> {
+        let n = self.lattice().sites();
+        let is_eighth = self.group().members().len() == Symmetry::ALL.len();
+        // A row of the eighth is from the middle to the diagonal: what is on neither of them has eight copies.
+        let of_row = |mut counts: Vec<u64>, iy: usize| {
+            let columns = if is_eighth { n / 2..iy + 1 } else { 0..n };
+            let mut room = Vec::new();
+            let row = self.row(iy, columns.clone(), &mut room);
+            for (ix, &number) in columns.zip(row) {
+                let copies = match (is_eighth, ix == iy, !n.is_multiple_of(2) && ix == n / 2) {
+                    (false, ..) | (true, true, true) => 1,
+                    (true, false, false) => 8,
+                    (true, ..) => 4,
+                };
+                let number = usize::from(number);
+                if number >= counts.len() {
+                    counts.resize(number + 1, 0);
+                }
+                counts[number] += copies;
+            }
+            counts
+        };
+        let added = |a: Vec<u64>, b: Vec<u64>| {
+            let (mut longer, shorter) = if a.len() < b.len() { (b, a) } else { (a, b) };
+            longer.iter_mut().zip(&shorter).for_each(|(to, from)| *to += from);
+            longer
+        };
+        let first = if is_eighth { n / 2 } else { 0 };
+        (first..n)
+            .into_par_iter()
+            .fold(Vec::new, of_row)
+            .reduce(Vec::new, added)
+    }
+
     fn extent(&self, iy: usize, columns: Range<usize>, room: &mut Vec<u16>) -> Option<RowExtent> {
         let Some(inside) = self.phase().columns(iy) else {
             return RowExtent::of(columns.start, self.occupied(iy, columns, room));
@@ -222,5 +259,8 @@ impl PillarRows for ClassPillars {
     }
     fn extent(&self, iy: usize, columns: Range<usize>, room: &mut Vec<u16>) -> Option<RowExtent> {
         self.rows().extent(iy, columns, room)
+    }
+    fn histogram(&self) -> Vec<u64> {
+        self.rows().histogram()
     }
 }

@@ -281,4 +281,25 @@ mod tests {
             assert_eq!(array.classes.len(), classes, "{name}");
         }
     }
+
+    /// Counts of an element that is not held are those of its map: with all symmetries, on an even and an odd lattice, and with fewer.
+    #[test]
+    fn computed_pillars_are_counted_as_those_that_are_held() {
+        let designs = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../designs"));
+        let mini = designs.join("mini_3x3.toml");
+        let text = std::fs::read_to_string(&mini).unwrap();
+        for diameter_um in ["60", "60.4"] {
+            let text = text.replace("diameter_um = 60", &format!("diameter_um = {diameter_um}"));
+            let array = PillarArray::build_within(&Design::parse(&mini, &text).unwrap(), 0, &Silent).unwrap();
+            assert_eq!(array.classes.len(), 3);
+            for class in &array.classes {
+                assert!(matches!(class.widths, ClassPillars::Computed(_)));
+                assert_eq!(
+                    class.widths.histogram(),
+                    class.widths.whole().histogram(),
+                    "{diameter_um} um"
+                );
+            }
+        }
+    }
 }
