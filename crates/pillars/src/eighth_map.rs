@@ -88,15 +88,10 @@ impl EighthMap {
         self.numbers.set(place, number);
     }
 
-    /// Number of sites that symmetry takes a site to, itself included: 8, 4 on an axis or a diagonal, 1 in the middle.
+    /// Number of sites that symmetry takes a site to, itself included: [`Lattice::copies`].
     #[inline]
     pub fn copies(&self, ix: usize, iy: usize) -> usize {
-        let [x, y] = [ix, iy].map(|i| self.lattice.half_index(i).abs());
-        match (x == y, x == 0 || y == 0) {
-            (true, true) => 1,
-            (false, false) => 8,
-            _ => 4,
-        }
+        self.lattice.copies(ix, iy)
     }
 }
 

@@ -119,7 +119,7 @@ impl PillarRows for ComputedWidths {
         let (phase, along_y) = (self.phase(), self.phase_along_y());
         if let (None, Some(inside)) = (&along_y, phase.columns(iy)) {
             // Most of what is asked for is inside: no site is asked whether it is.
-            let inside = inside.start.max(columns.start)..inside.end.min(columns.end);
+            let inside = common(&inside, &columns);
             room.clear();
             if !inside.is_empty() {
                 room.resize(inside.start - columns.start, 0);
@@ -139,19 +139,16 @@ impl PillarRows for ComputedWidths {
 
     /// Rows are counted on all threads; of an element with all eight symmetries an eighth is.
     fn histogram(&self) -> Vec<u64> {
-        let n = self.lattice().sites();
+        let lattice = self.lattice();
+        let n = lattice.sites();
         let is_eighth = self.group().members().len() == Symmetry::ALL.len();
-        // A row of the eighth is from the middle to the diagonal: what is on neither of them has eight copies.
+        // A row of the eighth is from the middle to the diagonal.
         let of_row = |mut counts: Vec<u64>, iy: usize| {
             let columns = if is_eighth { n / 2..iy + 1 } else { 0..n };
             let mut room = Vec::new();
             let row = self.row(iy, columns.clone(), &mut room);
             for (ix, &number) in columns.zip(row) {
-                let copies = match (is_eighth, ix == iy, !n.is_multiple_of(2) && ix == n / 2) {
-                    (false, ..) | (true, true, true) => 1,
-                    (true, false, false) => 8,
-                    (true, ..) => 4,
-                };
+                let copies = if is_eighth { lattice.copies(ix, iy) as u64 } else { 1 };
                 let number = usize::from(number);
                 if number >= counts.len() {
                     counts.resize(number + 1, 0);
@@ -176,13 +173,18 @@ impl PillarRows for ComputedWidths {
         let Some(inside) = self.phase().columns(iy) else {
             return RowExtent::of(columns.start, self.occupied(iy, columns, room));
         };
-        let (start, end) = (inside.start.max(columns.start), inside.end.min(columns.end));
-        (start < end).then(|| RowExtent {
-            first: start,
-            last: end - 1,
-            pillars: (end - start) as u64,
+        let inside = common(&inside, &columns);
+        (!inside.is_empty()).then(|| RowExtent {
+            first: inside.start,
+            last: inside.end - 1,
+            pillars: inside.len() as u64,
         })
     }
+}
+
+/// Columns of both.
+fn common(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    a.start.max(b.start)..a.end.min(b.end)
 }
 
 /// Pillars of a class of elements.
@@ -257,9 +259,11 @@ impl PillarRows for ClassPillars {
     fn occupied<'r>(&'r self, iy: usize, columns: Range<usize>, room: &'r mut Vec<u16>) -> &'r [u16] {
         self.rows().occupied(iy, columns, room)
     }
+
     fn extent(&self, iy: usize, columns: Range<usize>, room: &mut Vec<u16>) -> Option<RowExtent> {
         self.rows().extent(iy, columns, room)
     }
+
     fn histogram(&self) -> Vec<u64> {
         self.rows().histogram()
     }

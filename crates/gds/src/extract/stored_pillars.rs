@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::WHOLE_SITE_BYTES;
 use metalith_pillars::{EighthMap, Lattice, PillarMap, PillarRows};
 
 /// Pillars that were read of one element.
@@ -20,7 +21,7 @@ impl StoredPillars {
         match self {
             Self::Empty(_) => 0,
             Self::Eighth(map) => map.bytes_of_site() * EighthMap::sites(map.lattice()),
-            Self::Whole(map) => 2 * map.number.len() as u64,
+            Self::Whole(map) => WHOLE_SITE_BYTES * map.number.len() as u64,
         }
     }
 

@@ -63,31 +63,26 @@ fn split_into(values: &[Complex32], [real, imaginary]: [&mut [f32]; 2]) {
     }
 }
 
-/// Add the weighted sum of some spectra, moved by the turns of their phase along x and along y, to each sum with its weight, in
-/// some columns.
+/// Add the weighted sum of one to four spectra, moved by the turns of their phase along x and along y, which is one column, to each
+/// sum with its weight, in some columns.
 pub(super) fn add_part(
     terms: &[(&SplitSpectrum, f32)],
     columns: Range<usize>,
-    [along_x, along_y]: [&[Complex32]; 2],
+    (along_x, along_y): (&[Complex32], &SplitSpectrum),
     weights: &[f32],
     sums: &mut [SplitSpectrum],
 ) {
-    let Some((first, _)) = terms.first() else { return };
-    let mut turned = vec![0.0; 4 * first.stride];
-    let (turn, mixed) = turned.split_at_mut(2 * first.stride);
-    let (real, imaginary) = turn.split_at_mut(first.stride);
-    split_into(along_y, [real, imaginary]);
-    let along_y = [&*real, &*imaginary];
+    let mut mixed = vec![0.0; 2 * along_y.stride];
+    let (real, imaginary) = mixed.split_at_mut(along_y.stride);
     for k in columns {
         let columns: Vec<_> = terms
             .iter()
             .map(|(spectrum, weight)| (spectrum.column(k), *weight))
             .collect();
-        let (real, imaginary) = mixed.split_at_mut(first.stride);
         Arch::new().dispatch(Mix {
             terms: &columns,
             along_x: along_x[k],
-            along_y,
+            along_y: along_y.column(0),
             mixed: [&mut *real, &mut *imaginary],
         });
         for (sum, weight) in sums.iter_mut().zip(weights) {
@@ -112,7 +107,7 @@ struct Mix<'a> {
 }
 
 impl Mix<'_> {
-    /// The same for a number of terms that is known: their registers stay.
+    /// Variant of [`WithSimd::with_simd`] for a known number of terms: each has its registers.
     #[inline(always)]
     fn with<S: Simd, const N: usize>(self, simd: S) {
         let terms: [_; N] = std::array::from_fn(|i| {

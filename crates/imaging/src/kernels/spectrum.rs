@@ -101,7 +101,7 @@ impl SpectrumPlan {
                 add_part(
                     &terms,
                     at.clone(),
-                    [&part.along_x, &part.along_y],
+                    (&part.along_x, &part.along_y),
                     &part.weights,
                     &mut sums,
                 );
@@ -191,7 +191,7 @@ struct MovedSum {
     blended: Vec<(usize, f32)>,
     /// Turns of the phase of frequencies along x and along y, by which its chief ray moves.
     along_x: Vec<Complex32>,
-    along_y: Vec<Complex32>,
+    along_y: SplitSpectrum,
     /// Weight in the kernel of each spectrum of the scene.
     weights: Vec<f32>,
 }
@@ -202,7 +202,7 @@ impl MovedSum {
         Self {
             blended: part.blended.iter().map(|(i, weight)| (*i, *weight as f32)).collect(),
             along_x: along(0),
-            along_y: along(1),
+            along_y: SplitSpectrum::of(&along(1), size),
             weights: basis.iter().map(|b| (part.weight * b.at(part.nm)) as f32).collect(),
         }
     }

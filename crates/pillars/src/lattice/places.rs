@@ -166,6 +166,18 @@ impl Lattice {
         let (x, y) = (self.half_index(ix), self.half_index(iy));
         x * x + y * y
     }
+
+    /// Number of sites that the symmetries of the square take a site to, itself included: 8, 4 on an axis or a diagonal, 1 in the
+    /// middle.
+    #[inline]
+    pub fn copies(&self, ix: usize, iy: usize) -> usize {
+        let [x, y] = [ix, iy].map(|i| self.half_index(i).abs());
+        match (x == y, x == 0 || y == 0) {
+            (true, true) => 1,
+            (false, false) => 8,
+            _ => 4,
+        }
+    }
 }
 
 /// Steps of places as units of distances, rounded.
