@@ -5,9 +5,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use metalith::CalibratedModel;
 use metalith::compensate::{compensate, compensated_name, write_compensation_report};
-use metalith::layout::{LayoutFormat, OasisEncoding, Written, write_apertures_as, write_pillars_as};
+use metalith::file::file_digest;
+use metalith::layout::{
+    KeptPieces, LayoutFormat, OasisEncoding, PieceShard, Written, make_pieces, write_apertures_as, write_pillars_as,
+    write_pillars_by_pieces,
+};
 use metalith::report::{count, counted, sig};
-use metalith::{Design, FolderLock, Hierarchy, PillarArray, Result, write_layer_properties};
+use metalith::text::hex;
+use metalith::{Design, FolderLock, Hierarchy, PillarArray, Progress, Result, write_layer_properties};
 
 use super::out_folder::OutFolder;
 use super::paths::{inputs_of, paths};
@@ -30,10 +35,32 @@ pub(crate) struct LayoutArgs {
     #[arg(long, value_name = "MODEL")]
     compensate: Option<PathBuf>,
 
+    /// Keep the pieces of the file in a folder while it is made: the same command goes on where an earlier run was stopped. They
+    /// are removed when the layout is complete. For OASIS alone.
+    #[arg(long, value_name = "FOLDER")]
+    pieces: Option<PathBuf>,
+
+    /// Make one of several shards of the pieces, and no layout: run `1/4` to `4/4`, on machines that share the folder, then the
+    /// command without this option. The bytes are those of one run.
+    #[arg(long, value_name = "K/N", requires = "pieces", value_parser = shard)]
+    shard: Option<PieceShard>,
+
     /// Print names and counts of the files as JSON.
     #[arg(long)]
     json: bool,
 }
+
+fn shard(text: &str) -> std::result::Result<PieceShard, String> {
+    let numbers = text.split_once('/').map(|(number, of)| (number.parse(), of.parse()));
+    match numbers {
+        Some((Ok(number), Ok(of))) if (1..=of).contains(&number) => Ok(PieceShard { number, of }),
+        _ => Err("give the number of the shard and how many there are, as 1/4".into()),
+    }
+}
+
+/// Writer of the pillar layout of a design.
+pub(crate) type PillarWriter<'w> =
+    &'w dyn Fn(&Design, &PillarArray, Hierarchy, LayoutFormat, &Path, &dyn Progress) -> Result<Written>;
 
 /// Folder of the files, and the nesting of their geometry.
 #[derive(Args)]
@@ -152,14 +179,15 @@ impl Target {
         OutFolder::of(self.out.as_deref(), Path::new("out").join(name), path)
     }
 
-    /// Write all files of a design into the folder of a turn, with others that `also` writes beside them and of them. Files named in
+    /// Write all files of a design into the folder of a turn, with others that `also` writes beside them and of them; `pillars` writes
+    /// the pillar layout. Files named in
     /// `stale` go.
     pub(crate) fn publish(
         &self,
-        design: &Design,
-        array: &PillarArray,
+        (design, array): (&Design, &PillarArray),
         turn: &FolderLock,
         stale: &[&str],
+        pillars: PillarWriter<'_>,
         also: impl FnOnce(&Files, &Path) -> Result<()>,
         terminal: &Terminal,
     ) -> Result<Files> {
@@ -170,20 +198,27 @@ impl Target {
             self.format.asked()?.unwrap_or_default().extension()
         );
         let files = turn.publish(&set, stale, |folder| {
-            let files = self.write(design, array, folder, terminal)?;
+            let files = self.write(design, array, folder, pillars, terminal)?;
             also(&files, folder)?;
             Ok(files)
         })?;
         Ok(files.moved_to(turn.folder()))
     }
 
-    fn write(&self, design: &Design, array: &PillarArray, folder: &Path, terminal: &Terminal) -> Result<Files> {
+    fn write(
+        &self,
+        design: &Design,
+        array: &PillarArray,
+        folder: &Path,
+        pillars: PillarWriter<'_>,
+        terminal: &Terminal,
+    ) -> Result<Files> {
         let file = |suffix: &str| folder.join(format!("{}{suffix}", design.name));
         let properties = file(".lyp");
         let format = self.format.asked()?.unwrap_or_default();
         let named = |what: &str| file(&format!("_{what}.{}", format.extension()));
         let hierarchy = self.hierarchy(design);
-        let pillars = write_pillars_as(design, array, hierarchy, format, &named("pillars"), terminal)?;
+        let pillars = pillars(design, array, hierarchy, format, &named("pillars"), terminal)?;
         let apertures = write_apertures_as(design, format, &named("apertures"))?;
         write_layer_properties(design, &properties)?;
         for remark in &pillars.remarks {
@@ -207,6 +242,31 @@ impl Target {
     }
 }
 
+impl LayoutArgs {
+    /// The pieces that are kept of a design, and the encoding that they are of.
+    fn kept_pieces(&self, design: &Design, terminal: &Terminal) -> Result<Option<(KeptPieces, OasisEncoding)>> {
+        let Some(folder) = &self.pieces else {
+            return Ok(None);
+        };
+        let LayoutFormat::Oasis(encoding) = self.target.format.asked()?.unwrap_or_default() else {
+            return Err(metalith::Error::refused(
+                "option/pieces-of-gdsii",
+                "--pieces keeps the pieces of a layout in OASIS",
+                "give --oasis compact too, or leave out --pieces",
+            ));
+        };
+        let model = self.compensate.as_deref().map(file_digest).transpose()?;
+        let layout = format!(
+            "metalith {}\ndesign {}\nhierarchy {:?}\nencoding {encoding:?}\nmodel {}\n",
+            env!("CARGO_PKG_VERSION"),
+            design.digest(),
+            self.target.hierarchy(design),
+            model.map_or_else(|| "none".into(), |digest| hex(&digest)),
+        );
+        Ok(Some((KeptPieces::open(folder, &layout, terminal)?, encoding)))
+    }
+}
+
 pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
     let mut design = standard_input::design(&args.design, terminal)?;
     let warnings = design.warnings()?;
@@ -217,7 +277,13 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let out = args.target.folder(&name, &args.design)?;
     terminal.stop_on_interrupt();
-    let mut array = PillarArray::build(&design, terminal)?;
+    // What is written once is made once, when it is written; a model of the process compares all pillars many times.
+    let is_written_once = args.compensate.is_none() && args.target.hierarchy(&design) == Hierarchy::Folded;
+    let mut array = if is_written_once {
+        PillarArray::build_to_write(&design, terminal)?
+    } else {
+        PillarArray::build(&design, terminal)?
+    };
     let mut compensation = None;
     if let Some(path) = &args.compensate {
         let model = CalibratedModel::read(path)?;
@@ -225,6 +291,24 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
         design.name = name;
         let intended = std::mem::replace(&mut array, compensated.array.clone());
         compensation = Some((model, intended, compensated));
+    }
+    let pieces = args.kept_pieces(&design, terminal)?;
+    if let (Some((kept, encoding)), Some(shard)) = (&pieces, args.shard) {
+        make_pieces(
+            &design,
+            &array,
+            args.target.hierarchy(&design),
+            *encoding,
+            (kept, shard),
+            terminal,
+        )?;
+        terminal.clear();
+        if args.json {
+            print_json(&serde_json::json!({ "pieces": args.pieces, "shard": [shard.number, shard.of] }));
+        } else if !terminal.is_quiet() {
+            print_line!("shard {} of {} is made", shard.number, shard.of);
+        }
+        return Ok(Outcome::Fine);
     }
     let inputs = inputs_of(&design, args.compensate.as_deref());
     let turn = out.turn(paths(&inputs), terminal)?;
@@ -235,7 +319,18 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
         }
         None => Ok(()),
     };
-    let written = args.target.publish(&design, &array, &turn, &[], report, terminal)?;
+    let writer: PillarWriter<'_> = match &pieces {
+        None => &write_pillars_as,
+        Some((kept, encoding)) => &|design, array, hierarchy, _, path, progress| {
+            write_pillars_by_pieces(design, array, hierarchy, *encoding, (path, kept), progress)
+        },
+    };
+    let written = args
+        .target
+        .publish((&design, &array), &turn, &[], writer, report, terminal)?;
+    if let Some((kept, _)) = pieces {
+        kept.remove()?;
+    }
     terminal.clear();
     if args.json {
         let json = serde_json::json!({

@@ -20,6 +20,7 @@ mod info;
 mod layout;
 mod new;
 mod new_set;
+mod numbers;
 mod optimise;
 mod optimise_camera;
 mod out_folder;
@@ -152,20 +153,21 @@ fn program() -> metalith::Result<PathBuf> {
 /// of the library, such as an interpreter, are not the program themselves: then the first argument is a file that is.
 pub fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let given: Vec<OsString> = arguments.into_iter().collect();
-    let arguments = match Arguments::try_parse_from(&given) {
+    let arguments = match numbers::parse(&given) {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help is no error, and goes to standard output. Errors repeat what was given, which may be the name of a file.
             // A break in a name would begin a line: the error is that of the names as they are shown.
             let names = given.iter().map(|name| printable(&name.to_string_lossy()).into_owned());
-            let error = Arguments::try_parse_from(names).err().unwrap_or(error);
+            let error = numbers::parse(names).err().unwrap_or(error);
             let plain = error.render().to_string();
             if printable_lines(&plain) == plain {
                 let _ = error.print();
             } else {
                 output::tell(&plain);
             }
-            if let Some(hint) = renamed::hint(&error, &given) {
+            let hint = renamed::hint(&error, &given).map(str::to_owned);
+            if let Some(hint) = hint.or_else(|| numbers::hint(&error)) {
                 output::tell(&format!("\n  help: {hint}\n"));
             }
             return u8::try_from(error.exit_code()).unwrap_or(2);

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use metalith::layout::write_pillars_as;
 use metalith::{Error, PillarArray, Result};
 
 use super::layout::Target;
@@ -39,9 +40,14 @@ pub(crate) fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     args.judging.check_drawn(&design, &array)?;
     let turn = out.turn(paths(&args.judging.inputs(&design)), terminal)?;
     // A report speaks of the layout beside it: the old one must not stand beside a new layout, whatever happens.
-    let written = args
-        .target
-        .publish(&design, &array, &turn, &REPORT_FILES, |_, _| Ok(()), terminal)?;
+    let written = args.target.publish(
+        (&design, &array),
+        &turn,
+        &REPORT_FILES,
+        &write_pillars_as,
+        |_, _| Ok(()),
+        terminal,
+    )?;
     let judged = args
         .judging
         .judge(&design, &array, &written.pillars.path, &turn, terminal);

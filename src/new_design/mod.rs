@@ -8,6 +8,7 @@ use std::path::Path;
 use crate::cell::cache_folder;
 use crate::cell_study::{CellRequest, ChosenCell};
 use crate::design::{DIAMETER, FOCAL_LENGTH};
+use crate::report::sig;
 use crate::{Error, LatticeKind, PillarShape, Pitch, Progress, Result, numerical_aperture};
 
 pub(crate) use start_cell::Materials;
@@ -30,6 +31,9 @@ const FINEST_CHORD_NM: f64 = 5.0;
 
 /// Shorter wavelengths are micrometres (nm).
 const SHORTEST_NM: f64 = 10.0;
+
+/// Ratios of focal length and diameter of a lens. Beyond these one of both is in another unit: f/0.1 is an aperture of 0.98.
+const F_NUMBERS: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
 
 /// Narrowest pillar that a design file takes (nm).
 const NARROWEST_NM: u16 = 10;
@@ -151,8 +155,27 @@ impl NewDesign {
         self.check_widths()
     }
 
-    /// Refuse a wavelength that is one of micrometres.
+    /// Refuse a wavelength that is one of micrometres, and a focal length or diameter that is one of millimetres beside the other.
     fn check_unit(&self) -> Result<()> {
+        let f_number = self.focal_length_um() / self.diameter_um();
+        if f_number > 0.0 && f_number.is_finite() && !F_NUMBERS.contains(&f_number) {
+            let (focal, diameter) = (self.focal_length_um(), self.diameter_um());
+            let (name, um) = if f_number < 1.0 {
+                ("a focal length", focal)
+            } else {
+                ("a diameter", diameter)
+            };
+            return Err(Error::refused(
+                "new/out-of-range",
+                format!("a lens of {diameter} um and f = {focal} um, f/{}", sig(f_number, 2)),
+                format!(
+                    "micrometres are meant: {name} of {um} mm is {}? f/{} to f/{} are designed",
+                    um * 1e3,
+                    F_NUMBERS.start(),
+                    F_NUMBERS.end()
+                ),
+            ));
+        }
         match self.wavelength_nm {
             Some(nm) if nm > 0.0 && nm < SHORTEST_NM => Err(Error::refused(
                 "new/out-of-range",

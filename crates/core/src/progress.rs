@@ -53,6 +53,35 @@ impl Progress for Silent {
     fn advance(&self, _steps: u64) {}
 }
 
+/// Work that has another name for whoever waits: one of several passes over a file.
+pub struct Named<'a>(pub &'a dyn Progress, pub &'a str);
+
+impl Progress for Named<'_> {
+    fn begin(&self, _what: &str, steps: u64) {
+        self.0.begin(self.1, steps);
+    }
+
+    fn advance(&self, steps: u64) {
+        self.0.advance(steps);
+    }
+
+    fn note(&self, text: &str) {
+        self.0.note(text);
+    }
+
+    fn warn(&self, text: &str) {
+        self.0.warn(text);
+    }
+
+    fn strict(&self) -> bool {
+        self.0.strict()
+    }
+
+    fn stopped(&self) -> bool {
+        self.0.stopped()
+    }
+}
+
 /// Hears that the user wants to stop, and shows nothing: the work is a step of something else.
 pub struct Quiet<'a>(pub &'a dyn Progress);
 

@@ -8,7 +8,7 @@ use crate::phase::{ElementPhase, LensPhase, RadialPhase, TermForm};
 use crate::{AskedLight, CellIncidence, CellSpec, Design, LatticeOrders, LensSpec};
 
 /// Sites of a design whose phase is compared with the phase of their neighbours: of larger elements some rows are.
-const MOST_SITES: usize = 1 << 22;
+const MOST_SITES: usize = 1 << 19;
 
 /// Rows of an element that are compared at least.
 const FEWEST_ROWS: usize = 16;

@@ -247,7 +247,7 @@ pub enum ExtractionError {
     WhichLayer { contents: String },
     #[error("{groups} separate groups of shapes on layer {layers}")]
     Groups { groups: usize, layers: String, most: usize },
-    #[error("small shapes are spread over more than {most} places of 8 um")]
+    #[error("small shapes are spread over more than {most} places of 33 um")]
     Scattered { most: usize },
     /// Pillars that would take far more lattice sites than there are pillars.
     #[error(
@@ -377,7 +377,10 @@ impl ExtractionError {
             Self::NoElements { .. } => "name the layer that the pillars are on, or give the design".into(),
             Self::WhichLayer { .. } => "name the layer of the pillars with --layer".into(),
             Self::Groups { most, .. } => format!("up to {most} elements are read; is this the layer of the pillars?"),
-            Self::Scattered { .. } => "give the design, which says where the elements are".into(),
+            Self::Scattered { .. } => {
+                "lenses of up to 50 mm are found without a design; give the design, which says where the elements are"
+                    .into()
+            }
             Self::Sparse { .. } => "this is no lens on a lattice; give the design to say where its elements are".into(),
             Self::Lattice { .. } => {
                 "lattices with a pitch of whole steps of 0.05 nm about a whole nanometre are read".into()

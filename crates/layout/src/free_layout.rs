@@ -6,7 +6,7 @@ use chrono::NaiveDateTime;
 
 use super::fixed_shapes::FixedShapes;
 use super::pillar_form::PillarForm;
-use super::{LayoutFormat, PillarLayout, Written};
+use super::{LayoutFormat, PiecesOf, PillarLayout, Written};
 use metalith_core::{Error, LayerNumber, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{Hierarchy, LayoutLayer};
@@ -64,5 +64,5 @@ pub fn write_free(
         form: PillarForm::plain(free.shape).on_grid(array.lattice.unit()),
         fixed: FixedShapes::default(),
     };
-    layout.write(array, hierarchy, format, path, progress)
+    layout.write(array, hierarchy, (format, PiecesOf::None), path, progress)
 }

@@ -28,6 +28,7 @@ use metalith_core::{AtomicFile, Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, Hierarchy, LayoutLayer};
 use metalith_gds::library::GdsElement;
+use oasis::PiecesOf;
 use pillars::PillarWriter;
 
 pub use convert::convert;
@@ -35,6 +36,7 @@ pub use format::{LayoutFormat, OasisEncoding};
 pub use free_layout::{FreeLayout, write_free};
 pub use gds_frame::{gds_date, gds_units};
 pub use layer_properties::write_layer_properties;
+pub use oasis::{KeptPieces, PieceShard};
 pub use pillar_form::PillarForm;
 pub use pillars::orientation;
 pub use read::{extraction_plan, read_pillars};
@@ -82,7 +84,47 @@ pub fn write_pillars_as(
     path: &Path,
     progress: &dyn Progress,
 ) -> Result<Written> {
+    PillarLayout::of(design).write(array, hierarchy, (format, PiecesOf::None), path, progress)
+}
+
+/// Variant of [`write_pillars_as`] in OASIS that takes the pieces of the file that are kept, and keeps all others: a run that was
+/// stopped goes on, to the same bytes.
+///
+/// # Errors
+/// As [`write_pillars`], and if a piece cannot be kept.
+pub fn write_pillars_by_pieces(
+    design: &Design,
+    array: &PillarArray,
+    hierarchy: Hierarchy,
+    encoding: OasisEncoding,
+    (path, kept): (&Path, &KeptPieces),
+    progress: &dyn Progress,
+) -> Result<Written> {
+    let format = (LayoutFormat::Oasis(encoding), PiecesOf::All(kept));
     PillarLayout::of(design).write(array, hierarchy, format, path, progress)
+}
+
+/// Make a shard of the pieces of a layout in OASIS, and keep them: several machines make one file.
+///
+/// # Errors
+/// If a piece cannot be kept, or the user stopped it; the pieces that were made stay.
+pub fn make_pieces(
+    design: &Design,
+    array: &PillarArray,
+    hierarchy: Hierarchy,
+    encoding: OasisEncoding,
+    (kept, shard): (&KeptPieces, PieceShard),
+    progress: &dyn Progress,
+) -> Result<()> {
+    progress.begin("writing pieces", pillars_in_file(array, hierarchy) / shard.of as u64);
+    oasis::make_pieces(
+        &PillarLayout::of(design),
+        array,
+        hierarchy,
+        encoding,
+        (kept, shard),
+        progress,
+    )
 }
 
 /// Write the aperture layout of a design in a format: one flat cell of openings, marks of the second step and label; in
@@ -124,14 +166,16 @@ impl<'a> PillarLayout<'a> {
         &self,
         array: &PillarArray,
         hierarchy: Hierarchy,
-        format: LayoutFormat,
+        (format, pieces): (LayoutFormat, PiecesOf<'_>),
         path: &Path,
         progress: &dyn Progress,
     ) -> Result<Written> {
         progress.begin("writing pillars", pillars_in_file(array, hierarchy));
         match format {
             LayoutFormat::Gds => self.write_gds(array, hierarchy, path, progress),
-            LayoutFormat::Oasis(encoding) => oasis::write_pillars(self, array, hierarchy, encoding, path, progress),
+            LayoutFormat::Oasis(encoding) => {
+                oasis::write_pillars(self, array, hierarchy, (encoding, pieces), path, progress)
+            }
         }
     }
 

@@ -49,9 +49,19 @@ impl EighthMap {
         }
     }
 
-    /// Bytes of a site: one, or two where more than 255 numbers differ.
-    pub fn bytes_of_site(&self) -> u64 {
-        self.numbers.bytes_of_one()
+    /// A lattice without pillars, for some that are mostly as those of this map on the same lattice, or follow from them width by
+    /// width: these take an eighth of a byte a site, and keep the memory of this map.
+    #[must_use]
+    pub fn empty_like(&mut self) -> Self {
+        Self {
+            lattice: self.lattice,
+            numbers: self.numbers.zero_like(),
+        }
+    }
+
+    /// Memory of the sites (bytes): one a site, or two where more than 255 numbers differ.
+    pub fn bytes(&self) -> u64 {
+        self.numbers.bytes()
     }
 
     /// The pillars of an element that all eight symmetries leave as it is.
@@ -69,7 +79,7 @@ impl EighthMap {
 
     /// Distance of a site of an axis from the middle, in sites, from zero on either side.
     #[inline]
-    fn distance(&self, i: usize) -> usize {
+    pub fn distance(&self, i: usize) -> usize {
         let n = self.lattice.sites();
         let half = n.div_ceil(2);
         if i < n / 2 { half - 1 - i } else { i - n / 2 }

@@ -5,6 +5,7 @@ mod eighth_map;
 mod element_site;
 mod kind;
 mod lattice;
+mod like_numbers;
 mod mixed;
 mod packed_numbers;
 mod pillar_check;

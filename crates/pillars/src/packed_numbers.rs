@@ -1,7 +1,11 @@
-//! Numbers in a byte each, as long as few of them differ.
+//! Numbers in a byte each, as long as few of them differ, or in a bit each where they are like others.
+
+use std::sync::Arc;
+
+use crate::like_numbers::LikeNumbers;
 
 /// Numbers that a byte tells apart; the first is zero.
-const KINDS: usize = 256;
+pub(crate) const KINDS: usize = 256;
 
 /// Many numbers, a byte each while no more than [`KINDS`] differ, two bytes after that.
 #[derive(Clone, Debug)]
@@ -16,6 +20,10 @@ pub(crate) enum PackedNumbers {
         packed: Vec<u8>,
     },
     Many(Vec<u16>),
+    /// Numbers that others are held against.
+    Shared(Arc<Self>),
+    /// Numbers that follow from others, but for a few.
+    Like(LikeNumbers),
 }
 
 impl PackedNumbers {
@@ -29,10 +37,35 @@ impl PackedNumbers {
         }
     }
 
-    pub(crate) fn bytes_of_one(&self) -> u64 {
+    /// As many zeros, which become numbers that are mostly like these.
+    pub(crate) fn zero_like(&mut self) -> Self {
+        let others = match self {
+            Self::Shared(others) => others.clone(),
+            own => {
+                let others = Arc::new(std::mem::replace(own, Self::zero(0)));
+                *own = Self::Shared(others.clone());
+                others
+            }
+        };
+        Self::Like(LikeNumbers::new(others))
+    }
+
+    pub(crate) fn len(&self) -> usize {
         match self {
-            Self::Few { .. } => 1,
-            Self::Many(_) => 2,
+            Self::Few { packed, .. } => packed.len(),
+            Self::Many(numbers) => numbers.len(),
+            Self::Shared(numbers) => numbers.len(),
+            Self::Like(numbers) => numbers.len(),
+        }
+    }
+
+    /// Memory of the numbers (bytes), without that of others that they are like.
+    pub(crate) fn bytes(&self) -> u64 {
+        match self {
+            Self::Few { packed, .. } => packed.len() as u64,
+            Self::Many(numbers) => 2 * numbers.len() as u64,
+            Self::Shared(numbers) => numbers.bytes(),
+            Self::Like(numbers) => numbers.bytes(),
         }
     }
 
@@ -41,15 +74,13 @@ impl PackedNumbers {
         match self {
             Self::Few { numbers, packed, .. } => numbers[usize::from(packed[place])],
             Self::Many(numbers) => numbers[place],
+            Self::Shared(numbers) => numbers.get(place),
+            Self::Like(numbers) => numbers.get(place),
         }
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = u16> {
-        let count = match self {
-            Self::Few { packed, .. } => packed.len(),
-            Self::Many(numbers) => numbers.len(),
-        };
-        (0..count).map(|place| self.get(place))
+        (0..self.len()).map(|place| self.get(place))
     }
 
     #[inline]
@@ -60,31 +91,47 @@ impl PackedNumbers {
                 _ => self.set_new(place, number),
             },
             Self::Many(numbers) => numbers[place] = number,
+            Self::Shared(_) => self.set_new(place, number),
+            Self::Like(numbers) => {
+                if !numbers.set(place, number) {
+                    self.set_new(place, number);
+                }
+            }
         }
     }
 
-    /// Variant of [`PackedNumbers::set`] for a number that there may not be yet.
+    /// Variant of [`PackedNumbers::set`] for a number that there is no room for, as the numbers are held.
     #[cold]
     fn set_new(&mut self, place: usize, number: u16) {
-        if let Self::Few {
-            numbers,
-            kinds,
-            kind_of,
-            packed,
-        } = self
-        {
-            let index = usize::from(number);
-            kind_of.resize(kind_of.len().max(index + 1), 0);
-            if number == 0 {
-                packed[place] = 0;
-                return;
+        match self {
+            Self::Few {
+                numbers,
+                kinds,
+                kind_of,
+                packed,
+            } => {
+                let index = usize::from(number);
+                kind_of.resize(kind_of.len().max(index + 1), 0);
+                if number == 0 {
+                    packed[place] = 0;
+                    return;
+                }
+                if *kinds < KINDS {
+                    (numbers[*kinds], kind_of[index], packed[place]) = (number, *kinds as u8, *kinds as u8);
+                    *kinds += 1;
+                    return;
+                }
+                *self = Self::Many(packed.iter().map(|kind| numbers[usize::from(*kind)]).collect());
             }
-            if *kinds < KINDS {
-                (numbers[*kinds], kind_of[index], packed[place]) = (number, *kinds as u8, *kinds as u8);
-                *kinds += 1;
-                return;
+            Self::Shared(numbers) => *self = Self::clone(numbers),
+            Self::Like(_) => {
+                let mut own = Self::zero(self.len());
+                for (place, number) in self.iter().enumerate().filter(|(_, number)| *number != 0) {
+                    own.set(place, number);
+                }
+                *self = own;
             }
-            *self = Self::Many(packed.iter().map(|kind| numbers[usize::from(*kind)]).collect());
+            Self::Many(_) => {}
         }
         self.set(place, number);
     }
@@ -103,6 +150,8 @@ impl PackedNumbers {
                 let from = numbers[first..].iter().step_by(step);
                 to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
             }
+            Self::Shared(numbers) => numbers.copy(first, step, to),
+            Self::Like(numbers) => numbers.copy(first, step, to),
         }
     }
 }
@@ -127,10 +176,46 @@ mod tests {
                 "{kinds}"
             );
             // Zero is one of them.
-            assert_eq!(packed.bytes_of_one(), if kinds <= KINDS { 1 } else { 2 });
+            assert_eq!(packed.bytes(), if kinds <= KINDS { 2000 } else { 4000 });
             let mut column = [0; 40];
             packed.copy(5, 9, &mut column);
             assert!((0..40).all(|k| column[k] == number(5 + 9 * k, kinds)));
         }
+    }
+
+    /// Numbers that are held against others are what they were set to: the same, wider ones, some others, all others, and in what
+    /// is changed after that.
+    #[test]
+    fn numbers_like_others_are_what_they_were_set_to() {
+        let count = 1_000_000;
+        let mut first = PackedNumbers::zero(count);
+        (0..count).for_each(|place| first.set(place, (place % 5 * (100 + place / 5 % 9)) as u16));
+        let plain: Vec<u16> = first.iter().collect();
+        let same = |_: usize, n: u16| n;
+        let wider = |place: usize, n: u16| {
+            if place % 7000 == 6 {
+                13
+            } else {
+                n + 2 * u16::from(n > 0)
+            }
+        };
+        let apart = |place: usize, n: u16| if place % 900 == 8 { 0 } else { n + (place % 3) as u16 };
+        let rules: [&dyn Fn(usize, u16) -> u16; 3] = [&same, &wider, &apart];
+        for (number, least) in rules.into_iter().zip([8, 6, 1]) {
+            let mut like = first.zero_like();
+            assert!(like.iter().all(|n| n == 0) && first.iter().eq(plain.iter().copied()));
+            (0..count).for_each(|place| like.set(place, number(place, plain[place])));
+            assert!(like.iter().eq((0..count).map(|place| number(place, plain[place]))));
+            assert!(like.bytes() * least <= first.bytes(), "{}", like.bytes());
+            let mut row = [0; 50];
+            like.copy(30, 11, &mut row);
+            assert!((0..50).all(|k| row[k] == like.get(30 + 11 * k)));
+            for (place, n) in [(8, 0), (8, 77), (6, plain[6]), (6, 0)] {
+                like.set(place, n);
+                assert_eq!(like.get(place), n);
+            }
+        }
+        first.set(3, 9);
+        assert_eq!((first.get(3), first.get(4)), (9, plain[4]));
     }
 }

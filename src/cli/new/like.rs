@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use metalith::phase::RadialPhase;
+use metalith::report::sig;
 use metalith::{Design, Error, NewDesign, Result};
 
 use crate::cli::Terminal;
@@ -139,8 +140,34 @@ impl Like<'_> {
             )?;
             // The mapping is solved from the new cell: what the old one was for is no longer said.
             text = without_section(&text, "[mapping.cell]");
+            text = text.replace("SiN pillars", "pillars");
         }
-        Ok(text)
+        Ok(self.titled(&text, [diameter_um, focal_length_um], (x, y)))
+    }
+
+    /// The text with a title for the new lens, without the words for people on the old one.
+    fn titled(&self, text: &str, [diameter_um, focal_length_um]: [f64; 2], (x, y): (u32, u32)) -> String {
+        let lenses = if (x, y) == (1, 1) {
+            "One lens".into()
+        } else {
+            format!("{x} x {y} lenses")
+        };
+        let title = format!(
+            "{lenses} of {} um, f = {} um, after {}",
+            sig(diameter_um, 6),
+            sig(focal_length_um, 6),
+            self.shipped
+        );
+        let mut head = true;
+        let lines = text.lines().filter(|line| {
+            head &= line.starts_with('#') || line.is_empty();
+            !head
+        });
+        let titled = |line: &str| match line.split_once('=') {
+            Some((key, _)) if key.trim() == "title" => format!("title = \"{title}\"\n"),
+            _ => format!("{line}\n"),
+        };
+        lines.map(titled).collect()
     }
 
     /// Other pillars, and what follows from another wavelength.

@@ -68,17 +68,11 @@ impl ComputedWidths {
     /// turns one element into the other to the last bit. Of phases over the plane nothing is known: each such element
     /// is its own copy alone.
     pub fn maps(&self, symmetry: Symmetry, to: &Self) -> bool {
-        let (own, other) = (self.phase(), to.phase());
-        let [along_y, other_along_y] = [self, to].map(Self::phase_along_y);
-        let steered_alone = |phase: &ElementPhase<'_>| phase.is_steered_alone();
-        if ![&own, &other]
-            .into_iter()
-            .chain(&along_y)
-            .chain(&other_along_y)
-            .all(steered_alone)
-        {
+        if !(self.is_told_by_phase() && to.is_told_by_phase()) {
             return symmetry == Symmetry::IDENTITY && self.element == to.element;
         }
+        let (own, other) = (self.phase(), to.phase());
+        let [along_y, other_along_y] = [self, to].map(Self::phase_along_y);
         let same_along_y = match (&along_y, &other_along_y) {
             (Some(own), Some(other)) => own.is_of_lens(other),
             (own, other) => own.is_none() && other.is_none(),
@@ -90,6 +84,11 @@ impl ComputedWidths {
             && self.rule == to.rule
             && self.element.wedge.wavelength_um == to.element.wedge.wavelength_um
             && symmetry.vector(self.directions()) == to.directions()
+    }
+
+    /// True if the phase tells which elements are copies of this one.
+    pub(super) fn is_told_by_phase(&self) -> bool {
+        self.phase().is_steered_alone() && self.phase_along_y().is_none_or(|phase| phase.is_steered_alone())
     }
 
     /// The symmetries that leave the element as it is.

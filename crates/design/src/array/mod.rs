@@ -76,6 +76,15 @@ impl PillarArray {
         Self::build_within(design, MOST_HELD, progress)
     }
 
+    /// Variant of [`PillarArray::build`] for a caller that reads each distinct element once: elements whose copies follow from their
+    /// phases are made row by row whatever their size. The pillars, classes and symmetries are the same.
+    ///
+    /// # Errors
+    /// As [`PillarArray::build`].
+    pub fn build_to_write(design: &Design, progress: &dyn Progress) -> Result<Self> {
+        Self::build_with(design, [0, MOST_HELD], progress)
+    }
+
     /// The array of pillars that were not made from a design: maps of widths, or of the numbers of rotations of rectangles, with the
     /// places of their centres (nm). Copies and symmetries are found as those of a design are; nothing is steered.
     ///
@@ -134,10 +143,16 @@ impl PillarArray {
     /// # Errors
     /// As [`PillarArray::build`].
     pub fn build_within(design: &Design, most_held: u64, progress: &dyn Progress) -> Result<Self> {
+        Self::build_with(design, [most_held; 2], progress)
+    }
+
+    /// Array in which elements of more sites are made row by row: of more than the first number where the phase tells which are
+    /// copies, of more than the second where pillars alone do.
+    fn build_with(design: &Design, [by_phase, by_pillars]: [u64; 2], progress: &dyn Progress) -> Result<Self> {
         let lattice = design.lattice();
         let lens = Arc::new(LensPhase::of(design));
         let along_y = design.along_y().map(|y| Arc::new(LensPhase::of(&y)));
-        let held = (lattice.sites() as u64).pow(2) <= most_held;
+        let sites = (lattice.sites() as u64).pow(2);
         let elements = design.elements();
         progress.begin("widths of the elements", elements.len() as u64);
         let mut array = Self {
@@ -160,7 +175,15 @@ impl PillarArray {
                     class,
                     symmetry,
                 }),
-                None if held => array.place(element, ClassPillars::Held(computed.map())),
+                None if sites
+                    <= if computed.is_told_by_phase() {
+                        by_phase
+                    } else {
+                        by_pillars
+                    } =>
+                {
+                    array.place(element, ClassPillars::Held(computed.map()));
+                }
                 None => array.place(element, ClassPillars::Computed(computed.clone())),
             }
             if firsts.len() < array.classes.len() {

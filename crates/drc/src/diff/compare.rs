@@ -8,26 +8,41 @@ use super::content::{Content, Outlines, Ring, TextCopy};
 use super::pairs::{self, Counted, Held};
 use super::report::{Change, ChangeMap, ElementDiff, LayerDiff, LayoutDiff, MissingDiff, TextAt, TreeDiff};
 use metalith_core::text::printable_bytes;
+use metalith_core::{Progress, Result};
 use metalith_gds::extract::{ExtractedElement, StoredPillars};
 use metalith_gds::{LayerNumber, Point, Rect};
-use metalith_pillars::{PillarId, PillarRows, PillarShape};
+use metalith_pillars::{EighthMap, PillarId, PillarRows, PillarShape};
+use rayon::prelude::*;
 
 /// Tiles along the longer side of the map of changes.
 const TILES: usize = 128;
 
 /// Everything that differs; `strings` are those that texts name by number, `unit_nm` is the common unit.
-pub(super) fn compare(a: Content, b: Content, strings: &[Box<[u8]>], unit_nm: f64, plan: &DiffPlan) -> LayoutDiff {
+///
+/// # Errors
+/// If the user stopped it.
+pub(super) fn compare(
+    a: &Content,
+    b: &Content,
+    strings: &[Box<[u8]>],
+    unit_nm: f64,
+    plan: &DiffPlan,
+    progress: &dyn Progress,
+) -> Result<LayoutDiff> {
     let mut changes = Changes {
         plan: *plan,
         total: 0,
         listed: Vec::new(),
         examples: BTreeMap::new(),
-        map: map_over(&a, &b, unit_nm),
+        map: map_over(a, b, unit_nm),
         held: Some(Vec::new()),
     };
     let mut elements: Vec<ElementDiff> = Vec::new();
+    // Eighths are compared first, then the rows that differ.
+    let sites: u64 = a.elements.iter().map(|e| (e.site.lattice.sites() as u64).pow(2)).sum();
+    progress.begin("comparing pillars", 2 * sites);
     for (number, (own, other)) in a.elements.iter().zip(&b.elements).enumerate() {
-        elements.push(element((own, other), a.shape, number, &mut changes));
+        elements.push(element((own, other), a.shape, number, &mut changes, progress)?);
     }
     let mut numbers: Vec<LayerNumber> = a.counts.keys().chain(b.counts.keys()).copied().collect();
     numbers.sort_unstable();
@@ -37,10 +52,10 @@ pub(super) fn compare(a: Content, b: Content, strings: &[Box<[u8]>], unit_nm: f6
         .into_iter()
         .map(|number| {
             let outlines = |c: &'_ Content| c.outlines.contains_key(&number);
-            let of_a = if outlines(&a) { &a.outlines[&number] } else { &nothing };
-            let of_b = if outlines(&b) { &b.outlines[&number] } else { &nothing };
+            let of_a = if outlines(a) { &a.outlines[&number] } else { &nothing };
+            let of_b = if outlines(b) { &b.outlines[&number] } else { &nothing };
             let count = |c: &Content| c.counts.get(&number).copied().unwrap_or(0);
-            layer(number, [count(&a), count(&b)], of_a, of_b, unit_nm, &mut changes)
+            layer(number, [count(a), count(b)], of_a, of_b, unit_nm, &mut changes)
         })
         .collect();
     let (texts_a, texts_b) = apart(&a.texts, &b.texts);
@@ -58,7 +73,7 @@ pub(super) fn compare(a: Content, b: Content, strings: &[Box<[u8]>], unit_nm: f6
     let same = |l: &LayerDiff| l.same_area || l.only_in_a + l.only_in_b == 0;
     let same_geometry = elements.iter().all(|e| e.changed() == 0) && layers.iter().all(same) && texts_apart == [0, 0];
     changes.finish(&mut elements, &mut layers);
-    LayoutDiff {
+    Ok(LayoutDiff {
         a: String::new(),
         b: String::new(),
         same_bytes: false,
@@ -75,7 +90,7 @@ pub(super) fn compare(a: Content, b: Content, strings: &[Box<[u8]>], unit_nm: f6
         listed: changes.listed,
         examples: changes.examples.into_values().collect(),
         map: changes.map,
-    }
+    })
 }
 
 struct Changes {
@@ -230,7 +245,8 @@ fn element(
     shape: PillarShape,
     number: usize,
     changes: &mut Changes,
-) -> ElementDiff {
+    progress: &dyn Progress,
+) -> Result<ElementDiff> {
     let rotated = shape.has_one_size();
     let edges = |number: u16| shape.edges_nm(PillarId(number));
     let lattice = a.site.lattice;
@@ -250,11 +266,10 @@ fn element(
         largest_change_nm: 0,
         rms_change_nm: 0.0,
     };
-    let (mut both, mut squares) = (0u64, 0u64);
+    let mut squares = 0u64;
     let layer = changes.plan.pillar_layer;
     let (n, [mut room, mut other_room]) = (lattice.sites(), [Vec::new(), Vec::new()]);
     let mut site = |row: usize, column: usize, from: u16, to: u16| {
-        both += u64::from(from != 0 && to != 0);
         if from == to {
             return;
         }
@@ -292,15 +307,57 @@ fn element(
         };
         changes.add(change, counted);
     };
+    // Rows that are the same in both eighths hold no change.
+    let apart = match (&a.widths, &b.widths) {
+        (StoredPillars::Eighth(a), StoredPillars::Eighth(b)) => Some((a, rows_apart(a, b, progress)?)),
+        _ => None,
+    };
     for row in 0..n {
+        progress.advance(n as u64);
+        if apart.as_ref().is_some_and(|(a, apart)| !apart[a.distance(row)]) {
+            continue;
+        }
+        progress.check_stopped()?;
         let from = a.widths.row(row, 0..n, &mut room);
         let to = b.widths.row(row, 0..n, &mut other_room);
         for (column, (&from, &to)) in from.iter().zip(to).enumerate() {
             site(row, column, from, to);
         }
     }
+    let both = diff.pillars[0] - diff.removed;
     diff.rms_change_nm = (squares as f64 / both.max(1) as f64).sqrt();
-    diff
+    Ok(diff)
+}
+
+/// Rows of two eighths on one lattice, by their distance from the middle in sites, in which a site is not the same in both.
+///
+/// # Errors
+/// If the user stopped it.
+fn rows_apart(a: &EighthMap, b: &EighthMap, progress: &dyn Progress) -> Result<Vec<bool>> {
+    let n = a.lattice().sites();
+    let none = || vec![false; n.div_ceil(2)];
+    let row_of = |(mut apart, mut rooms): (Vec<bool>, [Vec<u16>; 2]), iy: usize| {
+        if progress.stopped() {
+            return (apart, rooms);
+        }
+        let [own, other] = &mut rooms;
+        let row = a.distance(iy);
+        let sites = a.to_diagonal(iy, own).iter().zip(b.to_diagonal(iy, other));
+        for (column, _) in sites.enumerate().filter(|(_, (from, to))| from != to) {
+            (apart[row], apart[column]) = (true, true);
+        }
+        progress.advance(8 * row as u64);
+        (apart, rooms)
+    };
+    let either = |mut a: Vec<bool>, b: Vec<bool>| {
+        a.iter_mut().zip(b).for_each(|(to, from)| *to |= from);
+        a
+    };
+    let rows = (n / 2..n).into_par_iter();
+    let parts = rows.fold(|| (none(), Default::default()), row_of);
+    let apart = parts.map(|(apart, _)| apart).reduce(none, either);
+    progress.check_stopped()?;
+    Ok(apart)
 }
 
 fn layer(

@@ -69,8 +69,8 @@ impl Strings {
         number
     }
 
-    /// The strings in order, the texts of both layouts numbered and sorted by it.
-    pub(crate) fn sorted(self, contents: [&mut Content; 2]) -> Vec<Box<[u8]>> {
+    /// The strings in order, the texts of all layouts numbered and sorted by it.
+    pub(crate) fn sorted<'c>(self, contents: impl Iterator<Item = &'c mut Content>) -> Vec<Box<[u8]>> {
         let mut strings: Vec<(Box<[u8]>, u32)> = self.0.into_iter().collect();
         strings.sort_unstable();
         let mut place = vec![0; strings.len()];
@@ -89,12 +89,14 @@ impl Strings {
 }
 
 impl Content {
-    /// Read a layout; its coordinates times `factor` are in the common unit.
+    /// Read a layout; its coordinates times `factor` are in the common unit. Memory is spared where its elements are mostly like
+    /// others.
     pub(crate) fn read(
         layout: &Layout,
         factor: i64,
         wanted: WantedPillars<'_>,
         strings: &mut Strings,
+        like: &mut [ExtractedElement<StoredPillars>],
         progress: &dyn Progress,
     ) -> Result<Self> {
         let allowance = Allowance::of([layout]);
@@ -105,7 +107,7 @@ impl Content {
             finder: PillarFinder::new(wanted.shape, layout.unit_nm()),
             factor,
             unit_nm: layout.unit_nm(),
-            filler: Filler::new(wanted.sites.to_vec(), Scale::of(layout)?),
+            filler: Filler::new(wanted.sites.to_vec(), Scale::of(layout)?).like(like),
             outlines: BTreeMap::new(),
             held: 0,
             most: allowance.rects,

@@ -21,7 +21,7 @@ use std::io::Read;
 
 use super::work::Allowance;
 use content::{Content, Strings, WantedPillars};
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, Named, Progress, Result};
 use metalith_gds::extract::{PlaceFit, Scale, discover};
 use metalith_gds::{LayerNumber, Layout, Selection};
 use metalith_pillars::{ElementSite, PillarShape, UprightRectangles};
@@ -56,7 +56,10 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
     let den = den_a / gcd(den_a, den_b) * den_b;
     let factors = [num_a * (den / den_a), num_b * (den / den_b)];
     let (mut sites, mut shape) = (Vec::new(), None);
-    for layout in [a, b] {
+    // The same cells of the same bytes are read once.
+    let is_once = identical && a.tops() == b.tops();
+    let distinct = if is_once { &[a][..] } else { &[a, b] };
+    for layout in distinct {
         match discover(layout, &everything, &[plan.pillar_layer], Scale::of(layout)?, progress).map_err(Error::from) {
             // What stands at an angle is compared as outlines: nothing is turned and rounded for that.
             Ok(found) if found.turn.is_some() => {}
@@ -94,10 +97,18 @@ pub fn diff(a: &Layout, b: &Layout, plan: &DiffPlan, progress: &dyn Progress) ->
         shape: shape.unwrap_or_default(),
         sites: &sites,
     };
-    let mut content = |layout: &Layout, factor| Content::read(layout, factor, wanted, &mut strings, progress);
-    let (mut first, mut second) = (content(a, factors[0])?, content(b, factors[1])?);
-    let strings = strings.sorted([&mut first, &mut second]);
-    let mut report = compare::compare(first, second, &strings, 1.0 / den as f64, plan);
+    let reading = ["the first", "the second"].map(|which| format!("reading {which} layout"));
+    let [first_read, second_read] = [0, 1].map(|k| Named(progress, &reading[k]));
+    let mut first = Content::read(a, factors[0], wanted, &mut strings, &mut [], &first_read)?;
+    let mut second = if is_once {
+        None
+    } else {
+        let like = &mut first.elements;
+        Some(Content::read(b, factors[1], wanted, &mut strings, like, &second_read)?)
+    };
+    let strings = strings.sorted(std::iter::once(&mut first).chain(&mut second));
+    let second = second.as_ref().unwrap_or(&first);
+    let mut report = compare::compare(&first, second, &strings, 1.0 / den as f64, plan, progress)?;
     report.missing = missing::compare([a, b], factors, 1.0 / den as f64, plan.listed)?;
     report.same_geometry &= report.missing.apart == [0, 0];
     report.a = a.path().display().to_string();

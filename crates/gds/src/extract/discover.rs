@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_3;
 use super::failed;
 use super::lattices::{Cluster, FEWEST, few_are_off};
 use super::phases::PartVisitor;
-use super::places::{Centre, PlaceFit, Places, bits_of_tiles};
+use super::places::{Centre, PlaceFit, Places};
 use super::sites::Scale;
 use super::sizes::Sizes;
 use super::tiles::{COARSE, FINE, MOST_TILES, TileMap};
@@ -14,7 +14,7 @@ use crate::{
     Error, ExtractionError, LayerNumber, Layout, LayoutCell, OutlineMemo, PillarFinder, Point, Rect, Result, Selection,
     Shape, TiltedRectangle, Transform, Visitor, tilted_rectangle_of,
 };
-use metalith_core::Progress;
+use metalith_core::{Named, Progress};
 use metalith_pillars::{ElementSite, LatticeKind, PillarShape};
 
 /// Settings of one search of a layout.
@@ -119,7 +119,8 @@ pub fn discover(
         ..from.clone()
     };
     let fail = failed(layout.path());
-    let look = |how: Look| seen(layout, &selection, scale, how, progress);
+    let progress = Named(progress, "finding elements");
+    let look = |how: Look| seen(layout, &selection, scale, how, &progress);
     let close = look(CLOSE)?;
     let turned = match close.turn {
         None => None,
@@ -290,8 +291,7 @@ fn seen(layout: &Layout, selection: &Selection, scale: Scale, how: Look, progres
         let is_whole = found.as_ref().is_ok_and(|f| f.as_ref().is_none_or(|f| f.is_whole));
         let parts = if is_whole { Vec::new() } else { cluster.parts() };
         if !parts.is_empty() {
-            let bits = bits_of_tiles(scale, how.bits);
-            let mut visitor = PartVisitor::new(parts, shape, scale, bits, how.widest_nm);
+            let mut visitor = PartVisitor::new(parts, shape, scale, tiles.bits(), how.widest_nm);
             visit_turned(
                 layout,
                 selection,

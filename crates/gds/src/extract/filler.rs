@@ -33,6 +33,8 @@ pub struct Filler {
     images: Option<Images>,
     /// The first placement that these were found with.
     first: Transform,
+    /// Eighths to begin with, by element.
+    prepared: Vec<Option<EighthMap>>,
     pillars: u64,
     /// Memory of the sites that are held, and of those that may be (bytes).
     held: u64,
@@ -67,6 +69,7 @@ impl Filler {
             orbit_sites: Vec::new(),
             images: None,
             first: Transform::IDENTITY,
+            prepared: Vec::new(),
             pillars: 0,
             held: 0,
             most: MOST_BYTES,
@@ -101,6 +104,18 @@ impl Filler {
     #[must_use]
     pub fn holding(mut self, most: u64) -> Self {
         self.most = most;
+        self
+    }
+
+    /// This filler for elements that are mostly as these others on the same lattices, whose eighths are then kept once:
+    /// [`EighthMap::empty_like`].
+    #[must_use]
+    pub fn like(mut self, others: &mut [ExtractedElement<StoredPillars>]) -> Self {
+        let prepared = others.iter_mut().map(|other| match &mut other.widths {
+            StoredPillars::Eighth(map) => Some(map.empty_like()),
+            StoredPillars::Empty(_) | StoredPillars::Whole(_) => None,
+        });
+        self.prepared = prepared.collect();
         self
     }
 
@@ -143,10 +158,12 @@ impl Filler {
     fn hold_eighth(&mut self, element: u32) {
         let widths = &mut self.elements[element as usize].widths;
         let StoredPillars::Empty(lattice) = *widths else { return };
-        let held = self.held + EighthMap::sites(lattice);
+        let prepared = self.prepared.get_mut(element as usize).and_then(Option::take);
+        let map = prepared.unwrap_or_else(|| EighthMap::empty(lattice));
+        let held = self.held + map.bytes();
         if held <= self.most {
             self.held = held;
-            *widths = StoredPillars::Eighth(EighthMap::empty(lattice));
+            *widths = StoredPillars::Eighth(map);
         }
     }
 
@@ -205,10 +222,10 @@ impl Filler {
             for (orbit, &(row, column, width_nm)) in self.orbits.iter().zip(&sites) {
                 let copies = orbit.placements.len() as u64;
                 if let StoredPillars::Eighth(map) = &mut self.elements[orbit.element as usize].widths {
-                    let before = map.bytes_of_site();
+                    let before = map.bytes();
                     map.set(column, row, width_nm);
-                    if map.bytes_of_site() != before {
-                        self.held += EighthMap::sites(map.lattice());
+                    if map.bytes() != before {
+                        self.held = self.held - before + map.bytes();
                         self.refused |= self.held > self.most;
                     }
                     self.pillars += copies;

@@ -30,7 +30,7 @@ pub use unrecognised_shapes::{UnrecognisedShape, UnrecognisedShapes, Why};
 use std::path::Path;
 
 use crate::{Error, ExtractionError, Layout, ReadLimits, Result};
-use metalith_core::{LayerNumber, Progress};
+use metalith_core::{LayerNumber, Named, Progress};
 pub use metalith_pillars::ElementSite;
 use metalith_pillars::{EighthMap, PillarMap, PillarReader, PillarShape};
 use pillars::PillarCollector;
@@ -257,7 +257,13 @@ fn extract_from(
     let top = layout.roots(&selection)?[0];
     let turn = found.turn;
     let mut pillars = PillarCollector::new(plan, found, Scale::of(layout)?, most);
-    visit_turned(layout, &selection, turn, &mut pillars, progress)?;
+    visit_turned(
+        layout,
+        &selection,
+        turn,
+        &mut pillars,
+        &Named(progress, "reading pillars"),
+    )?;
     let name = layout.cells()[top].name.clone();
     pillars.finish(name).map_err(failed(layout.path()))
 }

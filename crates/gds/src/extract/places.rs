@@ -79,6 +79,10 @@ impl Places {
     pub(crate) fn united(mut self, mut others: Self) -> Self {
         self.place_own();
         others.place_own();
+        if self.tiles.bits() != others.tiles.bits() {
+            self.coarsen();
+            others.coarsen();
+        }
         self.scattered |= others.scattered || !self.tiles.unite(&others.tiles);
         self
     }
@@ -98,7 +102,7 @@ impl Places {
     #[inline]
     pub(crate) fn add(&mut self, placements: &[Transform], mut centre: impl FnMut(&Transform) -> Option<Centre>) {
         // A tile too many, and no more is looked for.
-        self.scattered |= self.tiles.len().max(self.own.len()) > MOST_TILES;
+        self.limit(self.tiles.len().max(self.own.len()));
         if self.scattered {
             return;
         }
@@ -109,13 +113,31 @@ impl Places {
             }
             return;
         }
-        for (placement, guess) in placements.iter().zip(&mut self.guesses) {
-            if self.tiles.len() > MOST_TILES {
+        for (k, placement) in placements.iter().enumerate() {
+            self.limit(self.tiles.len());
+            if self.scattered {
                 break;
             }
             if let Some(centre) = centre(placement) {
-                self.tiles.add(centre.at, centre.even, guess);
+                self.tiles.add(centre.at, centre.even, &mut self.guesses[k]);
             }
+        }
+    }
+
+    /// Make the tiles coarse if there are to be so many that no more are held; the shapes are scattered if they are coarse already.
+    #[inline]
+    fn limit(&mut self, tiles: usize) {
+        if tiles > MOST_TILES {
+            self.scattered |= self.tiles.bits() == COARSE;
+            self.coarsen();
+        }
+    }
+
+    #[cold]
+    fn coarsen(&mut self) {
+        if self.tiles.bits() < COARSE {
+            self.tiles = self.tiles.coarser(COARSE);
+            self.own = self.own.coarser(COARSE);
         }
     }
 
@@ -127,10 +149,16 @@ impl Places {
 
     /// Put the tiles of the last cell where it is placed.
     fn place_own(&mut self) {
+        /// Tiles that a tile of a cell is placed on, at most.
+        const SPREAD: usize = 4;
         if self.own.is_empty() {
             return;
         }
-        for placement in &self.placements {
+        for k in 0..self.placements.len() {
+            if self.tiles.len() + SPREAD * self.own.len() > MOST_TILES {
+                self.coarsen();
+            }
+            let placement = &self.placements[k];
             let Transform::Square { orientation, dx, dy } = *placement else {
                 continue;
             };

@@ -15,7 +15,7 @@ pub enum Elements {
     Given(Vec<ElementSite>),
     /// Wherever clusters of pillars are: pitch and phase of the lattice from their distances, its centre
     /// from the middle of the outermost. Elements less than 8 um apart count as one; where no pitch is
-    /// below 6 um, those less than 33 um apart.
+    /// below 6 um, or elements are larger than some 13 mm together, those less than 33 um apart.
     Discover,
 }
 

@@ -20,7 +20,7 @@ impl StoredPillars {
     pub fn bytes(&self) -> u64 {
         match self {
             Self::Empty(_) => 0,
-            Self::Eighth(map) => map.bytes_of_site() * EighthMap::sites(map.lattice()),
+            Self::Eighth(map) => map.bytes(),
             Self::Whole(map) => WHOLE_SITE_BYTES * map.number.len() as u64,
         }
     }

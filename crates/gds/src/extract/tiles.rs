@@ -10,7 +10,8 @@ pub(super) const FINE: u32 = 14;
 /// Bits of the side of a tile for pitches up to 20 um: 33 um, the widest whose places the numbers of
 /// [`TileMap::samples`] can hold.
 pub(super) const COARSE: u32 = 16;
-/// Tiles of a map at most: 5 x 5 lenses of 1 mm occupy 300,000, one of 10 mm 1.2 million.
+/// Tiles of a map at most: 5 x 5 lenses of 1 mm occupy 300,000, one of 10 mm 1.2 million. Of larger lenses they are made [`COARSE`], of
+/// which a lens of 54 mm occupies as many.
 pub(super) const MOST_TILES: usize = 1 << 21;
 /// Bits of the place of a tile along an axis by which it is looked up first: 128 x 128 tiles are 1 mm.
 const LATELY: u32 = 7;
@@ -55,7 +56,7 @@ impl Tile {
 
 /// Centres of pillars by tile.
 pub(super) struct TileMap {
-    /// [`FINE`] or [`COARSE`].
+    /// Bits of the side of a tile: [`FINE`] or [`COARSE`], with those of the steps of the scale.
     bits: u32,
     numbers: HashMap<(i64, i64), u32>,
     tiles: Vec<((i64, i64), Tile)>,
@@ -78,6 +79,42 @@ impl TileMap {
             last: Vec::new(),
             lately: vec![0; 1 << (2 * LATELY)],
         }
+    }
+
+    /// Bits of the side of a tile.
+    pub(crate) fn bits(&self) -> u32 {
+        self.bits
+    }
+
+    /// The pillars of this map by tiles of a larger side.
+    pub(crate) fn coarser(&self, bits: u32) -> Self {
+        let (mut coarse, mut guess) = (Self::new(bits), 0);
+        let shift = bits - self.bits;
+        for (number, (key, tile)) in self.tiles.iter().enumerate() {
+            let corner = self.corner(*key);
+            let at = coarse.at(Point::new(corner.0, corner.1), &mut guess);
+            let from = coarse.corner(coarse.tiles[at].0);
+            let (dx, dy) = ((corner.0 - from.0) as i32, (corner.1 - from.1) as i32);
+            let sum = &mut coarse.tiles[at].1;
+            sum.pillars += tile.pillars;
+            if tile.low.0 <= tile.high.0 {
+                sum.include(tile.low.0 + dx, tile.low.1 + dy);
+                sum.include(tile.high.0 + dx, tile.high.1 + dy);
+            }
+            let part = |place: i32, k: i64| (i64::from(place >> self.bits) * PARTS + k) >> shift;
+            for k in (0..PARTS * PARTS).filter(|k| tile.parts >> k & 1 == 1) {
+                sum.parts |= 1 << (part(dy, k / PARTS) * PARTS + part(dx, k % PARTS));
+            }
+            for place in self.samples(number).chain(self.last(number)) {
+                let (x, y) = coarse.within(place);
+                coarse.sample(at, x, y);
+            }
+            for place in self.odd_samples(number) {
+                let (x, y) = coarse.within(place);
+                coarse.sample_odd(at, x, y);
+            }
+        }
+        coarse
     }
 
     /// Column and row of the tile that holds a place.

@@ -6,7 +6,7 @@ use super::LayerInventory;
 use crate::extract::{Discovered, ExtractionPlan, LeftOut, Scale, discover, recognise, turned};
 use crate::layout::Layout;
 use crate::visit::Selection;
-use crate::{Error, Result};
+use crate::{Error, ExtractionError, Result};
 use metalith_core::{LayerNumber, Progress};
 use metalith_pillars::{ElementSite, LatticeKind};
 
@@ -88,7 +88,7 @@ pub(super) fn find(
         .filter(|l| l.kinds.pillar_like() > 1 && l.kinds.pillar_like() >= most / LEAST_SHARE)
         .collect();
     chosen.sort_by_key(|l| (std::cmp::Reverse(l.kinds.pillar_like()), l.layer));
-    let mut found = Vec::new();
+    let (mut found, mut left_out) = (Vec::new(), None);
     for &root in roots.iter().take(TOPS) {
         let top = &layout.cells()[root].name;
         let selection = Selection {
@@ -100,6 +100,12 @@ pub(super) fn find(
             let seen = discover(layout, &selection, &[inventory.layer], scale, progress);
             match seen.and_then(|seen| lattices_of(layout, top, inventory, seen, progress)) {
                 Ok(lattices) => found.push(lattices),
+                Err(
+                    ref error @ Error::Extraction {
+                        cause: ExtractionError::Scattered { .. },
+                        ..
+                    },
+                ) => left_out = Some(words(error)),
                 // No lattice is no fault.
                 Err(Error::Extraction { .. }) => {}
                 Err(error @ Error::Layout { .. }) => return Ok((found, Some(words(&error)))),
@@ -107,7 +113,7 @@ pub(super) fn find(
             }
         }
     }
-    Ok((found, None))
+    Ok((found, left_out))
 }
 
 /// Elements that were discovered on a layer, with their pillars counted if these are not too many.

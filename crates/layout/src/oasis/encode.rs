@@ -9,6 +9,7 @@ use metalith_pillars::{PillarRows, RowExtent};
 use rayon::prelude::*;
 
 use super::super::pillar_form::PillarForm;
+use super::pieces::PiecesOf;
 use super::ring_order;
 
 /// Bytes of records that are compressed together: smaller blocks cost size, larger ones memory.
@@ -88,10 +89,11 @@ pub(super) struct ElementPillars<'a> {
 }
 
 /// Blocks of a cell and the box around its pillars.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Encoded {
     pub blocks: Vec<CompressedBlock>,
     pub bounds: [i64; 4],
-    pillars: u64,
+    pub pillars: u64,
 }
 
 impl Encoded {
@@ -170,10 +172,12 @@ impl<'a> ElementPillars<'a> {
             .unwrap_or(0)
     }
 
-    /// Encode all pillars; blocks of the largest cell are handed to `put` in order, those of the others returned.
+    /// Encode all pillars, but those that were kept as pieces of this element; blocks of the largest cell are handed to `put` in
+    /// order, those of the others returned.
     pub(crate) fn encode(
         &self,
         encoding: PillarEncoding,
+        (pieces_of, element): (PiecesOf<'_>, usize),
         progress: &dyn Progress,
         mut put: impl FnMut(&CompressedBlock) -> Result<()>,
     ) -> Result<Vec<Encoded>> {
@@ -190,20 +194,29 @@ impl<'a> ElementPillars<'a> {
             .collect();
         let (largest, rings) = (self.largest(), self.rings(encoding));
         let mut cells: Vec<Encoded> = self.parts.iter().map(|_| Encoded::EMPTY).collect();
-        for batch in ranges.chunks(SIDE_BY_SIDE) {
+        for (number, batch) in ranges.chunks(SIDE_BY_SIDE).enumerate() {
             progress.check_stopped()?;
-            let encoded: Vec<Vec<Encoded>> = batch
-                .par_iter()
-                .map(|range| self.pieces(encoding, rings, range.clone()))
-                .collect();
-            for part in encoded {
-                for (k, cell) in part.into_iter().enumerate() {
-                    progress.advance(cell.pillars);
-                    cells[k].append(cell);
+            let encode = || {
+                let encoded: Vec<Vec<Encoded>> = batch
+                    .par_iter()
+                    .map(|range| self.pieces(encoding, rings, range.clone()))
+                    .collect();
+                let mut parts: Vec<Encoded> = self.parts.iter().map(|_| Encoded::EMPTY).collect();
+                for (part, more) in encoded.into_iter().flat_map(|piece| piece.into_iter().enumerate()) {
+                    parts[part].append(more);
                 }
-                cells[largest].blocks.iter().try_for_each(&mut put)?;
-                cells[largest].blocks.clear();
+                parts
+            };
+            for (k, part) in pieces_of
+                .piece([element, number], encode, progress)?
+                .into_iter()
+                .enumerate()
+            {
+                progress.advance(part.pillars);
+                cells[k].append(part);
             }
+            cells[largest].blocks.iter().try_for_each(&mut put)?;
+            cells[largest].blocks.clear();
         }
         Ok(cells)
     }

@@ -1,6 +1,7 @@
 //! Layouts as OASIS.
 
 mod encode;
+mod pieces;
 mod ring_order;
 
 use std::io::{BufWriter, Write};
@@ -16,6 +17,8 @@ use super::fixed_shapes::FixedShapes;
 use super::pillar_form::PillarForm;
 use super::{OasisEncoding, PillarLayout, Written, no_copies, no_symmetry, top_cell};
 use encode::{ElementPillars, NOTHING, PillarEncoding, bounds_of, unite};
+pub(super) use pieces::PiecesOf;
+pub use pieces::{KeptPieces, PieceShard};
 
 /// Nanometres in a micrometre.
 const NM_PER_UM: f64 = 1000.0;
@@ -43,18 +46,60 @@ pub(super) fn write_pillars(
     layout: &PillarLayout<'_>,
     array: &PillarArray,
     hierarchy: Hierarchy,
-    encoding: OasisEncoding,
+    (encoding, pieces): (OasisEncoding, PiecesOf<'_>),
     path: &Path,
     progress: &dyn Progress,
 ) -> Result<Written> {
     let (fixed, pillars) = (&layout.fixed, layout.layer);
     let mut file = OasisFile::create(&layout.top, layout.form.unit(), path)?;
+    let (placed, remarks) = write_elements(layout, array, hierarchy, (encoding, pieces), &mut file, progress)?;
+    if encoding == OasisEncoding::Plain {
+        file.top(fixed, &placed, |layer| layer.number() == pillars.number())?;
+        let mut written = file.finish(remarks)?;
+        written.beside = layers_apart(&layout.top, layout.form.unit(), fixed, pillars, path)?;
+        return Ok(written);
+    }
+    file.top(fixed, &placed, |_| true)?;
+    file.finish(remarks)
+}
+
+/// Make a shard of the pieces of an array of pillars.
+///
+/// # Errors
+/// As [`write_pillars`].
+pub(super) fn make_pieces(
+    layout: &PillarLayout<'_>,
+    array: &PillarArray,
+    hierarchy: Hierarchy,
+    encoding: OasisEncoding,
+    (kept, shard): (&KeptPieces, PieceShard),
+    progress: &dyn Progress,
+) -> Result<()> {
+    // The file around them is begun, for the numbers of cells, and never put into its place.
+    let path = kept.file_of(shard);
+    let mut file = OasisFile::create(&layout.top, layout.form.unit(), &path)?;
+    let pieces = (encoding, PiecesOf::Shard(kept, shard));
+    write_elements(layout, array, hierarchy, pieces, &mut file, progress)?;
+    Ok(())
+}
+
+/// Write the cells of all elements. Returns where they are placed, and remarks for people.
+fn write_elements(
+    layout: &PillarLayout<'_>,
+    array: &PillarArray,
+    hierarchy: Hierarchy,
+    (encoding, pieces): (OasisEncoding, PiecesOf<'_>),
+    file: &mut OasisFile<'_>,
+    progress: &dyn Progress,
+) -> Result<(Vec<PlacedCell>, Vec<String>)> {
     let mut remarks = Vec::new();
     let mut elements = Elements {
-        file: &mut file,
-        layer: pillars,
+        file,
+        layer: layout.layer,
         form: layout.form,
         encoding,
+        pieces,
+        written: 0,
         width_cells: vec![None; usize::from(u16::MAX) + 1],
         progress,
     };
@@ -66,14 +111,7 @@ pub(super) fn write_pillars(
         elements.apart(array)?
     };
     elements.width_cells()?;
-    if encoding == OasisEncoding::Plain {
-        file.top(fixed, &placed, |layer| layer.number() == pillars.number())?;
-        let mut written = file.finish(remarks)?;
-        written.beside = layers_apart(&layout.top, layout.form.unit(), fixed, pillars, path)?;
-        return Ok(written);
-    }
-    file.top(fixed, &placed, |_| true)?;
-    file.finish(remarks)
+    Ok((placed, remarks))
 }
 
 /// Write the aperture layout of a design as OASIS: one flat cell, in the plain encoding for each layer a file.
@@ -250,6 +288,9 @@ struct Elements<'f, 'p> {
     layer: &'f LayoutLayer,
     form: PillarForm,
     encoding: OasisEncoding,
+    pieces: PiecesOf<'f>,
+    /// Elements whose pillars were written.
+    written: usize,
     /// Cells of one width that were referred to.
     width_cells: Vec<Option<u64>>,
     progress: &'f dyn Progress,
@@ -348,7 +389,9 @@ impl Elements<'_, '_> {
             return names.iter().map(empty).collect();
         }
         numbers[largest] = file.begin(&names[largest])?;
-        let cells = pillars.encode(encoding, self.progress, |block| file.block(block))?;
+        let pieces = (self.pieces, self.written);
+        self.written += 1;
+        let cells = pillars.encode(encoding, pieces, self.progress, |block| file.block(block))?;
         file.writer.end_cell(bounds_of(cells[largest].bounds));
         for (k, cell) in cells.iter().enumerate().filter(|(k, _)| *k != largest) {
             numbers[k] = file.begin(&names[k])?;
@@ -358,13 +401,13 @@ impl Elements<'_, '_> {
         Ok(numbers.into_iter().zip(cells.iter().map(|c| c.bounds)).collect())
     }
 
-    /// Lists, but another encoding where it takes less than a share of their bytes, as a part of the pillars tells.
-    fn lists_or(other: PillarEncoding, share: f64, pillars: &mut ElementPillars<'_>) -> PillarEncoding {
+    /// Lists, but another encoding where it takes less than a shard of their bytes, as a part of the pillars tells.
+    fn lists_or(other: PillarEncoding, shard: f64, pillars: &mut ElementPillars<'_>) -> PillarEncoding {
         // Any numbers will do to see how small it gets.
         pillars.width_cells = (0..=u64::from(u16::MAX)).collect();
         let candidates = [pillars.lists(), other];
         match candidates.map(|encoding| pillars.bytes_of_sample(encoding)) {
-            [Some(lists), Some(others)] if others < share * lists => other,
+            [Some(lists), Some(others)] if others < shard * lists => other,
             _ => pillars.lists(),
         }
     }

@@ -37,6 +37,21 @@ impl CompressedBlock {
         }
     }
 
+    /// The block of these parts, as [`Self::unpacked`] and [`Self::bytes`] give them.
+    pub fn from_parts(unpacked: Option<u64>, bytes: Vec<u8>) -> Self {
+        Self { unpacked, bytes }
+    }
+
+    /// Length of the records (bytes), if they are compressed.
+    pub fn unpacked(&self) -> Option<u64> {
+        self.unpacked
+    }
+
+    /// The records, compressed or as they are.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
     fn plain(records: &[u8]) -> Self {
         Self {
             unpacked: None,
