@@ -19,17 +19,17 @@ struct Unit {
 const UNITS: [Unit; 5] = [
     Unit {
         ending: "-nm",
-        name: "nanometres",
+        name: "nanometres (nm)",
         written: &[("nm", 1.0), ("um", 1e3), ("mm", 1e6), ("m", 1e9)],
     },
     Unit {
         ending: "-um",
-        name: "micrometres",
+        name: "micrometres (um)",
         written: &[("nm", 1e-3), ("um", 1.0), ("mm", 1e3), ("cm", 1e4), ("m", 1e6)],
     },
     Unit {
         ending: "-mb",
-        name: "megabytes",
+        name: "megabytes (MB)",
         written: &[
             ("kB", 1e-3),
             ("MB", 1.0),
@@ -41,12 +41,12 @@ const UNITS: [Unit; 5] = [
     },
     Unit {
         ending: "-ms",
-        name: "milliseconds",
+        name: "milliseconds (ms)",
         written: &[("us", 1e-3), ("ms", 1.0), ("s", 1e3)],
     },
     Unit {
         ending: "-deg",
-        name: "degrees",
+        name: "degrees (deg)",
         written: &[("deg", 1.0)],
     },
 ];
@@ -87,9 +87,8 @@ pub(super) fn hint(error: &clap::Error) -> Option<String> {
         Some(format!(": {value} is {}", number * factor))
     });
     Some(format!(
-        "give a number of {} ({}) without its unit{}",
+        "give a number of {} without its unit{}",
         unit.name,
-        &unit.ending[1..],
         in_unit.unwrap_or_default()
     ))
 }

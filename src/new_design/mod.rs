@@ -157,9 +157,11 @@ impl NewDesign {
 
     /// Refuse a wavelength that is one of micrometres, and a focal length or diameter that is one of millimetres beside the other.
     fn check_unit(&self) -> Result<()> {
-        let f_number = self.focal_length_um() / self.diameter_um();
-        if f_number > 0.0 && f_number.is_finite() && !F_NUMBERS.contains(&f_number) {
-            let (focal, diameter) = (self.focal_length_um(), self.diameter_um());
+        let given = self.focal_length_um.zip(self.diameter_um);
+        let f_number = |(focal, diameter): (f64, f64)| focal / diameter;
+        let is_off = |ratio: f64| ratio > 0.0 && ratio.is_finite() && !F_NUMBERS.contains(&ratio);
+        if let Some((focal, diameter)) = given.filter(|given| is_off(f_number(*given))) {
+            let f_number = f_number((focal, diameter));
             let (name, um) = if f_number < 1.0 {
                 ("a focal length", focal)
             } else {

@@ -6,7 +6,7 @@ use metalith_core::Silent;
 use metalith_design::{Design, Hierarchy, PillarArray};
 use metalith_drc::diff::{DiffPlan, LayoutDiff, diff, page, text};
 use metalith_gds::Layout;
-use metalith_layout::write_pillars;
+use metalith_layout::{LayoutFormat, OasisEncoding, write_pillars, write_pillars_as};
 use metalith_testing::gds::Gds;
 use metalith_testing::lens::Chip;
 
@@ -36,6 +36,58 @@ fn written((design, array): (&Design, &PillarArray), hierarchy: Hierarchy, folde
     let path = folder.join(name);
     write_pillars(design, array, hierarchy, &path, &Silent).unwrap();
     path
+}
+
+/// Lenses of 16 mm, of so many places that these are taken together: found, and compared with brute force, by an eighth of each.
+#[test]
+fn large_lenses_are_compared_by_an_eighth() {
+    let path = metalith_testing::root().join("designs/lens_10mm.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let lens = |focal_length_um: &str| {
+        let changes = [
+            ("pitch_nm = 350", "pitch_nm = 4000"),
+            ("width_min_nm = 100", "width_min_nm = 1000"),
+            ("width_max_nm = 300", "width_max_nm = 3400"),
+            ("width_step_nm = 2 ", "width_step_nm = 20 "),
+            ("diameter_um = 10000", "diameter_um = 16000"),
+            ("spacing_um = 10100", "spacing_um = 16100"),
+            ("focal_length_um = 24000", focal_length_um),
+            ("size_um = [12000, 12000]", "size_um = [20000, 20000]"),
+            ("-5500, 5500, -5500, 5500", "-9000, 9000, -9000, 9000"),
+            ("-5500, -5500, 5500, 5500", "-9000, -9000, 9000, 9000"),
+        ];
+        let text = changes.iter().fold(text.clone(), |text, (from, to)| {
+            assert!(text.contains(from), "{from}");
+            text.replace(from, to)
+        });
+        let design = Design::parse(&path, &text).unwrap();
+        let array = PillarArray::build(&design, &Silent).unwrap();
+        (design, array)
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let file = |(design, array): &(Design, PillarArray), encoding, name: &str| {
+        let path = folder.path().join(name);
+        let format = LayoutFormat::Oasis(encoding);
+        write_pillars_as(design, array, Hierarchy::Folded, format, &path, &Silent).unwrap();
+        path
+    };
+    let (own, other) = (lens("focal_length_um = 38400"), lens("focal_length_um = 38400.01"));
+    let a = file(&own, OasisEncoding::Compact, "a.oas");
+    let copy = file(&own, OasisEncoding::Plain, "copy.oas");
+    let b = file(&other, OasisEncoding::Compact, "b.oas");
+    let rows = |array: &PillarArray| array.widths(&array.placed[0]).into_owned().number;
+    let [from, to] = [rows(&own.1), rows(&other.1)];
+    let apart = from.iter().zip(&to).filter(|(from, to)| from != to).count();
+    assert!(apart > 1000 && apart < from.len() / 100, "{apart}");
+    for (file, changed) in [(&a, 0), (&copy, 0), (&b, apart as u64)] {
+        let found = compare(&a, file);
+        let [element] = &found.elements[..] else {
+            panic!("{} elements", found.elements.len())
+        };
+        let pillars = from.iter().filter(|number| **number != 0).count() as u64;
+        assert_eq!((element.sites, element.pillars), (from.nrows(), [pillars; 2]));
+        assert_eq!((element.widened + element.narrowed, found.changes), (changed, changed));
+    }
 }
 
 #[test]

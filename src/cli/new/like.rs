@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use metalith::phase::RadialPhase;
-use metalith::report::sig;
 use metalith::{Design, Error, NewDesign, Result};
 
 use crate::cli::Terminal;
@@ -152,10 +151,11 @@ impl Like<'_> {
         } else {
             format!("{x} x {y} lenses")
         };
+        let round = |um: f64| (um * 1e3).round() * 1e-3;
         let title = format!(
             "{lenses} of {} um, f = {} um, after {}",
-            sig(diameter_um, 6),
-            sig(focal_length_um, 6),
+            round(diameter_um),
+            round(focal_length_um),
             self.shipped
         );
         let mut head = true;

@@ -147,9 +147,9 @@ pub(crate) fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
         ));
     }
     let asked = args.asked();
+    asked.check_given()?;
     let name = args.design.file_stem().unwrap_or_default().to_string_lossy();
     if let Some(shipped) = &args.like {
-        asked.check_given()?;
         let like = Like {
             shipped,
             path: &args.design,

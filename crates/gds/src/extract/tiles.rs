@@ -408,6 +408,39 @@ mod tests {
         [FINE, COARSE].into_iter().for_each(placed_as_its_pillars);
     }
 
+    /// A disc and a patch by fine tiles that are made coarse: tiles, counts and boxes of coarse ones, whose cells are placed alike.
+    #[test]
+    fn fine_tiles_that_are_made_coarse_are_coarse_ones() {
+        let places = (0..300 * 300).map(|k: i64| Point::new(700 * (k % 300) - 77_777, 700 * (k / 300)));
+        let pillars: Vec<Point> = places
+            .filter(|p| p.x.pow(2) + p.y.pow(2) < 110_000_i64.pow(2))
+            .collect();
+        let [mut fine, mut coarse] = [FINE, COARSE].map(TileMap::new);
+        for &place in &pillars {
+            fine.add(place, place.x % 2 == 0, &mut 0);
+            coarse.add(place, place.x % 2 == 0, &mut 0);
+        }
+        let made = fine.coarser(COARSE);
+        assert_eq!((made.bits(), made.len()), (COARSE, coarse.len()));
+        assert_eq!(found(&made), found(&coarse));
+        let placed = |cell: &TileMap| {
+            let mut map = TileMap::new(COARSE);
+            let placement = Transform::Square {
+                orientation: 5,
+                dx: 12_345,
+                dy: -777,
+            };
+            assert!(map.place(cell, &placement));
+            map
+        };
+        assert_eq!(found(&placed(&made)), found(&placed(&coarse)));
+        assert_eq!(placed(&made).len(), placed(&coarse).len());
+        for tile in 0..made.len() {
+            assert!(made.all_samples(tile).count() > 0);
+            assert!(made.all_samples(tile).all(|place| pillars.contains(&place)));
+        }
+    }
+
     /// A disc whose pillars are of two kinds, in turn or by halves: tiles of each, united, are those of all.
     #[test]
     fn tiles_of_two_kinds_are_those_of_all() {
