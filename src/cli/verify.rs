@@ -11,7 +11,7 @@ use metalith::sensor::Camera;
 use metalith::{
     AsBuiltChip, CalibratedModel, Design, Error, Fidelity, FolderLock, PillarArray, PillarRows, Result,
     SimulationCases, Verification, cell_models, verify,
-    verify::{Simulation, lens_figures, verdict_words, verify_in_parts, verify_pillars},
+    verify::{Simulation, lens_figures, verdict_words, verify_in_parts, verify_sampled},
     write_report,
 };
 
@@ -77,8 +77,8 @@ pub(crate) struct Judging {
     oblique: bool,
 
     /// Memory for reading back and simulating (MB). Larger layouts are simulated in parts, which takes more time, and without
-    /// other models for comparison. If a part is still too large, all pillars are compared with the design and nothing is
-    /// simulated.
+    /// other models for comparison. If a part is still too large, all pillars are compared with the design, and a sample of zones
+    /// is simulated.
     #[arg(long, value_name = "MB", default_value_t = 8000.0)]
     memory_mb: f64,
 
@@ -163,7 +163,9 @@ impl Judging {
                 if *parts == 1 { "" } else { "s" }
             )),
             Simulation::Not(why) => {
-                terminal.say(&format!("note: every pillar is compared, nothing is simulated: {why}"));
+                terminal.say(&format!(
+                    "note: every pillar is compared, but no more than a sample of zones is simulated: {why}"
+                ));
             }
         }
     }
@@ -203,7 +205,10 @@ impl Judging {
                 return self.report(design, array, &found, None, turn, terminal);
             }
             Simulation::Not(why) => {
-                let found = verify_pillars(design, array, layout, judge, why, terminal)?;
+                let drawn: &[Fidelity] = if self.model.is_none() { &[judge] } else { &[] };
+                let models = cell_models(design, drawn)?;
+                let cases = models.first().map(|cell| SimulationCases::judged_by(cell.as_ref()));
+                let found = verify_sampled(design, array, layout, (judge, cases.as_ref()), why, terminal)?;
                 return self.report(design, array, &found, None, turn, terminal);
             }
         }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{PsfPair, Verification, WhiteChannel};
+use super::{PsfPair, SampledElement, SampledSpot, SampledZones, Verification, WhiteChannel};
 use metalith_design::LimitSpec;
 
 /// One limit and what was reached.
@@ -16,6 +16,9 @@ pub struct Check {
     pub limit: f64,
     /// Sense of the limit: the least or the most that is allowed.
     pub sense: Sense,
+    /// True if a sample of zones was judged: `reached` is the end of the interval of three standard errors that is worse.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub sampled: bool,
 }
 
 /// Side of a limit that is the right one.
@@ -29,9 +32,13 @@ pub enum Sense {
 /// Verdict on the limits of a design, in words.
 pub fn verdict_words(found: &Verification) -> String {
     let (all, failed) = (found.checks.len(), found.checks.iter().filter(|c| !c.passed()).count());
+    let sampled = match found.checks.iter().filter(|c| c.sampled && c.passed()).count() {
+        0 => String::new(),
+        sampled => format!(", {sampled} of them by a sample of zones alone"),
+    };
     match (failed, all) {
         (0, 1) => "FILE MATCHES DESIGN: the one limit holds".into(),
-        (0, _) => format!("FILE MATCHES DESIGN: all {all} limits hold"),
+        (0, _) => format!("FILE MATCHES DESIGN: all {all} limits hold{sampled}"),
         _ => format!("{failed} of {all} limits do not hold"),
     }
 }
@@ -53,6 +60,14 @@ fn at_most(what: String, key: &'static str, reached: f64, limit: f64) -> Check {
         reached,
         limit,
         sense: Sense::AtMost,
+        sampled: false,
+    }
+}
+
+fn at_least(what: String, key: &'static str, reached: f64, limit: f64) -> Check {
+    Check {
+        sense: Sense::AtLeast,
+        ..at_most(what, key, reached, limit)
     }
 }
 
@@ -105,8 +120,13 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
             limits.rounding_phase_rms_max_rad,
         ));
     }
-    if let Some(why) = &found.not_simulated {
-        checks.extend(not_simulated(limits, why));
+    if let Some(none) = &found.not_simulated {
+        let sampled = found.sampled().map_or_else(Vec::new, |zones| of_sample(limits, zones));
+        let unknown = not_simulated(limits, &none.why).into_iter();
+        checks.extend(unknown.map(|check| {
+            let judged = sampled.iter().find(|judged| judged.key == check.key);
+            judged.cloned().unwrap_or(check)
+        }));
         return checks;
     }
     let spots = || {
@@ -158,13 +178,7 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
         if limit > 0.0
             && let Some((place, least)) = worst(spots().map(|(place, s)| (place, -reached(s))))
         {
-            checks.push(Check {
-                what: format!("{name}, {place}"),
-                key,
-                reached: -least,
-                limit,
-                sense: Sense::AtLeast,
-            });
+            checks.push(at_least(format!("{name}, {place}"), key, -least, limit));
         }
     }
     let told = found.camera.as_ref().map(|c| c.frequencies().half_nyquist_lp_mm);
@@ -197,13 +211,7 @@ pub(super) fn all(limits: &LimitSpec, found: &Verification) -> Vec<Check> {
         if limit > 0.0 {
             // A limit on what could not be simulated does not hold.
             let (place, least) = white(reached).unwrap_or_else(|| ("not simulated".into(), f64::NAN));
-            checks.push(Check {
-                what: format!("{name}, {place}"),
-                key,
-                reached: -least,
-                limit,
-                sense: Sense::AtLeast,
-            });
+            checks.push(at_least(format!("{name}, {place}"), key, -least, limit));
         }
     }
     checks
@@ -238,13 +246,53 @@ fn not_simulated(limits: &LimitSpec, why: &str) -> Vec<Check> {
             .map(|l| (l, Sense::AtLeast)),
     );
     set.map(|((key, limit), sense)| Check {
-        what: format!("not simulated: {why}"),
-        key,
-        reached: f64::NAN,
-        limit,
         sense,
+        ..at_most(format!("not simulated: {why}"), key, f64::NAN, limit)
     })
     .collect()
+}
+
+/// The limits that a sample of zones tells, each held by the end of an interval of three standard errors that is worse: what is
+/// left open by the sample does not hold.
+fn of_sample(limits: &LimitSpec, sample: &SampledZones) -> Vec<Check> {
+    let rms = |of: &dyn Fn(&SampledElement) -> f64| worst(sample.elements.iter().map(|e| (e.element.label(), of(e))));
+    let strehl = |of: &dyn Fn(&SampledSpot) -> f64| {
+        let spots = sample
+            .elements
+            .iter()
+            .flat_map(|e| e.spots.iter().map(|s| (s.label(&e.element), s)));
+        worst(spots.map(|(place, spot)| (place, -of(spot))))
+    };
+    let words =
+        |name: &str, place: String| format!("{name}, by a sample of zones, three standard errors allowed for, {place}");
+    let mapping = rms(&|e| e.mapping_rms_rad.most()).map(|(place, most)| {
+        let what = words("rms phase error of the mapping [rad]", format!("element {place}"));
+        at_most(
+            what,
+            "mapping_phase_rms_max_rad",
+            most,
+            limits.mapping_phase_rms_max_rad,
+        )
+    });
+    let rounding = rms(&|e| e.rounding_rms_rad.most()).map(|(place, most)| {
+        let what = words("rms phase error of rounding [rad]", format!("element {place}"));
+        at_most(
+            what,
+            "rounding_phase_rms_max_rad",
+            most,
+            limits.rounding_phase_rms_max_rad,
+        )
+    });
+    let ratio = strehl(&|s| s.strehl_ratio.map_or(0.0, |ratio| ratio.least())).map(|(place, least)| {
+        let what = words("Strehl ratio of the layout over the Strehl ratio of the target", place);
+        at_least(what, "strehl_ratio_min", -least, limits.strehl_ratio_min)
+    });
+    let peak = strehl(&|s| s.strehl.least()).map(|(place, least)| {
+        let what = words("Strehl ratio of the layout", place);
+        at_least(what, "strehl_min", -least, limits.strehl_min)
+    });
+    let all = [mapping, rounding, ratio, peak].into_iter().flatten();
+    all.map(|check| Check { sampled: true, ..check }).collect()
 }
 
 /// Name, key and limit of what is measured of a channel in white light.

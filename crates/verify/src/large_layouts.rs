@@ -1,4 +1,5 @@
-//! Layouts that are too large for a simulation of the usual kind: simulated in parts, or compared pillar by pillar alone.
+//! Layouts that are too large for a simulation of the usual kind: simulated in parts, or compared pillar by pillar, with a sample of
+//! zones simulated.
 
 use std::path::Path;
 
@@ -12,7 +13,10 @@ use metalith_layout::extraction_plan;
 use metalith_pillars::PillarRows;
 use metalith_wave::Accuracy;
 
-use super::{ElementCheck, LayoutFacts, PillarCheck, SimulationCases, Verification, check, compare, facts, judge};
+use super::{
+    ElementCheck, LayoutFacts, NotSimulated, PillarCheck, Sample, SampledZones, SimulationCases, Verification, check,
+    compare, facts, judge,
+};
 
 /// Compare the pillars of an element as they are held: of one that is held as an eighth, and meant to have all eight
 /// symmetries, each set of copies once.
@@ -65,21 +69,36 @@ fn read_folded(
     Ok((facts(&layout, &extraction, layout.path()), elements, extraction))
 }
 
-/// Read the layout at `path` back and compare every pillar with the design, without simulating any: the limits of the
-/// design on what only a simulation tells do not hold. Elements that the file folds by all eight symmetries take an
-/// eighth of the memory of others.
+/// Read the layout at `path` back, compare every pillar with the design, and simulate a sample of zones of each distinct element, since
+/// the whole is too large, for the reason `why`: the limits of the design on what the sample does not tell do not hold. Elements
+/// that the file folds by all eight symmetries take an eighth of the memory of others. Without `cases`, or if widths were moved on
+/// purpose, nothing is sampled: pillars as fabricated differ by their place on the chip.
 ///
 /// # Errors
-/// If the layout cannot be read, an element is too large to be held, or the user stopped it.
-pub fn verify_pillars(
+/// If the layout cannot be read, an element is too large to be held, a cell has no answer at a wavelength, or the user stopped it.
+pub fn verify_sampled(
     design: &Design,
     array: &PillarArray,
     path: &Path,
-    fidelity: Fidelity,
+    (fidelity, cases): (Fidelity, Option<&SimulationCases<'_>>),
     why: String,
     progress: &dyn Progress,
 ) -> Result<Verification> {
-    let (facts, elements, extraction) = read_folded(design, array, path, progress)?;
+    let (facts, mut elements, extraction) = read_folded(design, array, path, progress)?;
+    let sample = match cases.filter(|_| !array.compensated) {
+        Some(cases) => {
+            let widths: Vec<&dyn PillarRows> = extraction.elements.iter().map(|e| &e.widths as _).collect();
+            Sample::Sampled(SampledZones::of(
+                design,
+                array,
+                &mut elements,
+                &widths,
+                cases,
+                progress,
+            )?)
+        }
+        None => Sample::NotSampled("a chip as fabricated is simulated with all of its pillars in memory".into()),
+    };
     let mut verification = Verification {
         design: design.name.clone(),
         design_digest: design.digest(),
@@ -96,7 +115,7 @@ pub fn verify_pillars(
         mapping: design.mapping.solved.clone(),
         rotations: None,
         lattice_orders: design.lattice_orders(AskedLight::All)?,
-        not_simulated: Some(why),
+        not_simulated: Some(NotSimulated { why, sample }),
         checks: Vec::new(),
     };
     verification.checks = check::all(&design.verify.limits, &verification);

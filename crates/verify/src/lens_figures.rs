@@ -2,21 +2,27 @@
 
 use metalith_core::numerical_aperture;
 use metalith_design::Design;
-use metalith_report::{Cell, Column, exact, sig};
+use metalith_report::{Cell, Column, counted, exact, sig};
 use metalith_wave::psf::{AIRY_FWHM, FocusMetrics, PsfMetrics};
 
 use super::through_focus::focal_length_words;
-use super::{DistinctElement, PsfPair, Verification};
+use super::{DistinctElement, Estimate, PsfPair, SampledElement, SampledSpot, SampledStrehl, Verification};
 
 /// Most PSFs that are named one by one; of more, the best and the worst.
 const MOST_NAMED: usize = 3;
+
+/// Relative error of sums over a sample of which all terms are equal.
+const ROUNDING: f64 = 1e-9;
 
 /// Strehl ratio below which a target is not diffraction-limited (Marechal).
 const LOW_STREHL: f64 = 0.8;
 
 /// Strehl ratio, focusing efficiency and width of each PSF of the layout in words, by the simulation that judges; of many, of the PSFs
-/// with the greatest and the least Strehl ratio. Then the focal length found through focus.
+/// with the greatest and the least Strehl ratio. Then the focal length found through focus. Of a sample of zones, what it is first.
 pub fn lens_figures(design: &Design, found: &Verification) -> Vec<String> {
+    if let Some(sample) = found.sampled() {
+        return sample.elements.iter().flat_map(sampled).collect();
+    }
     let spots: Vec<(&DistinctElement, &PsfPair)> = found
         .distinct
         .iter()
@@ -37,6 +43,63 @@ pub fn lens_figures(design: &Design, found: &Verification) -> Vec<String> {
     lines.extend(named.into_iter().filter_map(words));
     lines.extend(found.distinct.iter().filter_map(through_focus));
     lines
+}
+
+/// Extent of the sample of an element, then its figures in each light; of many, of the greatest and the least Strehl ratio.
+fn sampled(element: &SampledElement) -> Vec<String> {
+    let mut lines = vec![format!(
+        "sample of {} in {}, {} % of the lens; not covered: stray light, shape of the PSF, MTF: element {}",
+        counted(element.sites as usize, "site"),
+        counted(element.zones, "zone"),
+        sig(element.share * 100.0, 2),
+        element.element.label()
+    )];
+    let spots = &element.spots;
+    if spots.len() <= MOST_NAMED {
+        lines.extend(spots.iter().map(|spot| sampled_words(element, spot)));
+        return lines;
+    }
+    let by_strehl = |a: &&SampledSpot, b: &&SampledSpot| a.strehl.least().total_cmp(&b.strehl.least());
+    for (name, spot) in [
+        ("greatest", spots.iter().max_by(by_strehl)),
+        ("least", spots.iter().min_by(by_strehl)),
+    ] {
+        let words = spot.map(|spot| format!("{name} of {}: {}", spots.len(), sampled_words(element, spot)));
+        lines.extend(words);
+    }
+    lines
+}
+
+fn sampled_words(element: &SampledElement, spot: &SampledSpot) -> String {
+    let efficiency = spot.focusing_efficiency.map_or_else(String::new, |share| {
+        let per_cent = Estimate {
+            value: share.value * 100.0,
+            standard_error: share.standard_error * 100.0,
+        };
+        format!(", focusing efficiency {} %", estimate_words(&per_cent))
+    });
+    format!(
+        "Strehl ratio {} (target phase {}){efficiency}: {}",
+        strehl_words(&spot.strehl),
+        strehl_words(&spot.target_strehl),
+        spot.label(&element.element)
+    )
+}
+
+/// Strehl ratio of a sample in words.
+pub(super) fn strehl_words(strehl: &SampledStrehl) -> String {
+    match strehl {
+        SampledStrehl::Found(estimate) => estimate_words(estimate),
+        SampledStrehl::Below(most) => format!("below {}", sig(*most, 1)),
+    }
+}
+
+/// Value and standard error in words; without an error that is but rounding.
+pub(super) fn estimate_words(estimate: &Estimate) -> String {
+    if estimate.standard_error < ROUNDING * estimate.value.abs() {
+        return sig(estimate.value, 3);
+    }
+    format!("{} ± {}", sig(estimate.value, 3), sig(estimate.standard_error, 1))
 }
 
 /// What an element shows through focus by wavelength, in words.

@@ -22,6 +22,7 @@ mod polychromatic_channels;
 mod polychromatic_page;
 mod psf_metrics;
 mod rotations;
+mod sampled_zones;
 mod single;
 mod single_memory;
 mod single_stack;
@@ -52,7 +53,7 @@ use metalith_wave::psf::ThroughFocus;
 pub use case::SimulationCases;
 pub use check::{Check, Sense, verdict_words};
 pub use distinct_elements::CopyAngle;
-pub use large_layouts::{verify_in_parts, verify_pillars};
+pub use large_layouts::{verify_in_parts, verify_sampled};
 pub use lens_figures::{focus_words, lens_figures, plane_words};
 pub use lens_outline::outline_warnings;
 pub use memory::Simulation;
@@ -60,11 +61,12 @@ pub use metalith_optics::SimulationCase;
 pub use metalith_pillars::PillarCheck;
 pub use optics::open_matched;
 pub use page::write_report;
-pub use phase::{PhaseError, PhaseErrors, PillarResponse};
+pub use phase::{PhaseError, PhaseErrors, PillarResponse, SitePhase};
 pub use polychromatic::CameraStatement;
 pub use polychromatic_channels::{Contrast, WhiteChannel};
 pub use psf_metrics::{OrderEfficiencies, PsfImages, PsfPair, PsfResult};
 pub use rotations::EqualRotations;
+pub use sampled_zones::{Estimate, NotSimulated, Sample, SampledElement, SampledSpot, SampledStrehl, SampledZones};
 pub use single::{Lighting, STREHL_AGAINST, SinglePsf, SinglePsfReport, single_psfs, write_single_psf_report};
 pub use single_memory::FocusRequest;
 pub use single_white::{SingleWhite, single_white, white_sampling};
@@ -89,8 +91,8 @@ pub struct LayoutFacts {
 pub struct ElementCheck {
     pub element: Element,
     pub widths: PillarCheck,
-    /// Index into [`Verification::distinct`] of the element that it is simulated as, itself or one that it is a copy of, if it is
-    /// as intended.
+    /// Index into [`Verification::distinct`], or into the elements of a sample, of the element that it is simulated as, itself or one
+    /// that it is a copy of, if it is as intended.
     pub copy_of: Option<usize>,
     /// Symmetry that turns that element into this one: pillars, field angles, and the places where light lands.
     pub turned: Option<Symmetry>,
@@ -154,9 +156,9 @@ pub struct Verification {
     /// Light of the design of which the lattice of the pillars sends some into oblique orders.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lattice_orders: Vec<LatticeOrders>,
-    /// Reason why nothing was simulated, if nothing was.
+    /// What stands in place of a simulation, if there was none.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub not_simulated: Option<String>,
+    pub not_simulated: Option<NotSimulated>,
     /// Every limit of the design, held or not.
     pub checks: Vec<Check>,
 }
@@ -165,6 +167,23 @@ impl Verification {
     /// True if all limits hold.
     pub fn passed(&self) -> bool {
         self.checks.iter().all(Check::passed)
+    }
+
+    /// The sample of zones, if that is what was simulated.
+    pub fn sampled(&self) -> Option<&SampledZones> {
+        match &self.not_simulated.as_ref()?.sample {
+            Sample::Sampled(zones) => Some(zones),
+            Sample::NotSampled(_) => None,
+        }
+    }
+
+    /// The element whose simulation or sample stands for an element; none of one that is not as intended.
+    fn simulated_as(&self, check: &ElementCheck) -> Option<Element> {
+        let k = check.copy_of?;
+        match &self.not_simulated {
+            None => Some(self.distinct.get(k)?.element),
+            Some(_) => Some(self.sampled()?.elements.get(k)?.element),
+        }
     }
 
     /// The field angles of the design that a spot of distinct element `k` is for, those of its copies among them: from where these
@@ -353,7 +372,7 @@ fn judge(
         simulated.push(DistinctElement {
             element,
             copies: one.copies,
-            phase: phase_errors(design, &read, &phase, &rule, progress)?,
+            phase: phase_errors(design, &read, &|ix, iy| phase.wrapped(ix, iy), &rule, progress)?,
             steepness: Steepness::of(&array.lattice, |ix, iy| phase.turns(ix, iy)),
             orders: simulator.orders(&element, &phase, &rule, &read, progress)?,
             spots: simulator.simulate(&one, &phase, &read, progress)?,
@@ -408,7 +427,7 @@ fn central(chosen: &[distinct_elements::Chosen]) -> Option<usize> {
 fn phase_errors(
     design: &Design,
     read: &optics::ReadElement<'_>,
-    phase: &ElementPhase<'_>,
+    phase: phase::SitePhase<'_>,
     rule: &PillarRule,
     progress: &dyn Progress,
 ) -> Result<PhaseErrors> {

@@ -38,7 +38,7 @@ pub enum Simulation {
         /// Memory that is taken in all, about (MB).
         needed_mb: f64,
     },
-    /// Not at all, and why; its pillars can be compared with the design: [`verify_pillars`](super::verify_pillars).
+    /// Not in full, and why; its pillars can be compared with the design, and zones sampled: [`verify_sampled`](super::verify_sampled).
     Not(String),
 }
 

@@ -7,7 +7,6 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use metalith_design::array::PillarRule;
-use metalith_design::phase::ElementPhase;
 use metalith_pillars::PillarRows;
 
 /// Root mean square and largest magnitude of a phase error over the pillars (rad); not a number if there are none.
@@ -35,13 +34,9 @@ pub struct PillarResponse<'a> {
 }
 
 impl PhaseErrors {
-    /// Compare the pillars of an element with its phase.
-    pub fn of(
-        widths: &dyn PillarRows,
-        phase: &ElementPhase<'_>,
-        rule: &PillarRule,
-        response: &PillarResponse<'_>,
-    ) -> Self {
+    /// Compare the pillars of an element with its phase: `phase` has the one of a column and a row (turns, 0 to 1), none where no
+    /// pillar is compared.
+    pub fn of(widths: &dyn PillarRows, phase: SitePhase<'_>, rule: &PillarRule, response: &PillarResponse<'_>) -> Self {
         let by_width = |nm: f64| TAU * rule.turns_of_width(nm);
         let written = (0..=widths.largest_number())
             .map(|w| TAU * rule.turns_of_written(w))
@@ -75,6 +70,9 @@ impl PhaseErrors {
         }
     }
 }
+
+/// Phase of a site by its column and row (turns, 0 to 1); none outside the lens.
+pub type SitePhase<'a> = &'a (dyn Fn(usize, usize) -> Option<f64> + Sync);
 
 /// A pillar as read, with the phase of its site (turns, 0 to 1).
 #[derive(Clone, Copy, Debug)]
@@ -119,7 +117,7 @@ impl Sums {
 /// the number of threads.
 fn per_row<T: Send>(
     widths: &dyn PillarRows,
-    phase: &ElementPhase<'_>,
+    phase: SitePhase<'_>,
     fold: impl Fn(&mut dyn Iterator<Item = Pillar>) -> T + Sync,
 ) -> Vec<T> {
     let n = widths.lattice().sites();
@@ -135,7 +133,7 @@ fn per_row<T: Send>(
                     Some(Pillar {
                         site: iy * n + ix,
                         width_nm,
-                        design_turns: phase.wrapped(ix, iy)?,
+                        design_turns: phase(ix, iy)?,
                     })
                 });
             fold(&mut pillars)

@@ -81,7 +81,7 @@ pub struct PsfImages {
 impl PsfPair {
     /// Wavelength and field angle of the element that is simulated, in words.
     pub fn place(&self) -> String {
-        self.place_of(self.field)
+        light_words(self.wavelength_um, self.field)
     }
 
     /// The field angle of the design that it is for: of a copy, if the design asks copies alone for this light.
@@ -91,16 +91,7 @@ impl PsfPair {
 
     /// Element, wavelength and field angle as the design asks for them, in words; `element` is that which is simulated.
     pub fn label(&self, element: &Element) -> String {
-        let element = self.copy.as_ref().map_or(element, |copy| &copy.element);
-        format!("element {}, {}", element.label(), self.place_of(self.asked()))
-    }
-
-    fn place_of(&self, field: FieldAngle) -> String {
-        let nm = self.wavelength_um * 1e3;
-        match field {
-            FieldAngle { x_deg, y_deg: 0.0 } => format!("{nm:.0} nm, {x_deg}°"),
-            FieldAngle { x_deg, y_deg } => format!("{nm:.0} nm, ({x_deg}, {y_deg})°"),
-        }
+        asked_words(element, self.copy.as_ref(), self.wavelength_um, self.field)
     }
 
     /// The metrics of the case that judges.
@@ -129,6 +120,26 @@ impl PsfPair {
     pub fn images(&self) -> Option<&PsfImages> {
         self.images.as_deref()
     }
+}
+
+/// Wavelength (um) and field angle in words.
+fn light_words(wavelength_um: f64, field: FieldAngle) -> String {
+    let nm = wavelength_um * 1e3;
+    match field {
+        FieldAngle { x_deg, y_deg: 0.0 } => format!("{nm:.0} nm, {x_deg}°"),
+        FieldAngle { x_deg, y_deg } => format!("{nm:.0} nm, ({x_deg}, {y_deg})°"),
+    }
+}
+
+/// Element, wavelength (um) and field angle as the design asks for them, in words: those of a copy, if copies alone are asked.
+pub(super) fn asked_words(
+    element: &Element,
+    copy: Option<&CopyAngle>,
+    wavelength_um: f64,
+    field: FieldAngle,
+) -> String {
+    let (element, field) = copy.map_or((element, field), |copy| (&copy.element, copy.field));
+    format!("element {}, {}", element.label(), light_words(wavelength_um, field))
 }
 
 /// Orders that the mapping sends light into by its own transmission, at one wavelength, by one cell.

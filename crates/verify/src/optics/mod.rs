@@ -92,7 +92,7 @@ impl<'a> ElementSimulator<'a> {
     }
 
     /// Result of `with` for an element's light from one of its field angles.
-    fn in_light<T>(
+    pub(crate) fn in_light<T>(
         &self,
         element: &Element,
         wave: &PlaneWave,
@@ -261,7 +261,8 @@ impl<'a> ElementSimulator<'a> {
         spec.wavelengths_um.par_iter().map(series).collect()
     }
 
-    fn window(&self, chief_um: [f64; 2], lens: &LensSpec, wavelength_um: f64) -> Window {
+    /// Window of the PSFs of a lens about the place where a chief ray lands.
+    pub(crate) fn window(&self, chief_um: [f64; 2], lens: &LensSpec, wavelength_um: f64) -> Window {
         let pitches = (self.lattice.pitch_um(), self.design.verify.window_samples);
         Window::of_psf(
             chief_um,
@@ -358,7 +359,7 @@ pub(super) fn landing(element: &Element, wavelength_um: f64, field: FieldAngle, 
 }
 
 /// The wave that arrives at an element from one of its field angles.
-fn arriving(element: &Element, wavelength_um: f64, field: FieldAngle) -> Result<PlaneWave> {
+pub(super) fn arriving(element: &Element, wavelength_um: f64, field: FieldAngle) -> Result<PlaneWave> {
     let field_rad = [field.x_deg, field.y_deg].map(f64::to_radians);
     Ok(incident(&element.wedge, wavelength_um, field_rad)?)
 }

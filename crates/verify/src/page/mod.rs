@@ -2,6 +2,7 @@
 
 mod designed;
 mod element;
+mod sampled;
 mod written;
 
 use std::path::Path;
@@ -38,10 +39,8 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
         &design.title,
         format!("{}, computed from the bytes of {}", design.name, found.layout.file),
     );
-    if let Some(why) = &found.not_simulated {
-        page.paragraph(format!(
-            "Every pillar was compared with the design. Nothing was simulated: {why}."
-        ));
+    if let Some(none) = &found.not_simulated {
+        sampled::first(&mut page, none);
     }
     page.verdict(Verdict::of(found.passed()), format!("{}.", verdict_words(found)));
     for line in lens_figures(design, found) {
@@ -55,10 +54,14 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
     let mut facts = vec![
         ("Pillars", count(found.layout.pillars)),
         ("Elements", found.elements.len().to_string()),
-        ("Distinct elements", found.distinct.len().to_string()),
-        ("Strehl ratio", range(found, |psf| psf.metrics.strehl)),
-        (contrast_at.as_str(), range(found, |psf| psf.mtf()[0])),
     ];
+    if found.not_simulated.is_none() {
+        facts.extend([
+            ("Distinct elements", found.distinct.len().to_string()),
+            ("Strehl ratio", range(found, |psf| psf.metrics.strehl)),
+            (contrast_at.as_str(), range(found, |psf| psf.mtf()[0])),
+        ]);
+    }
     let band = band_of(design, found);
     let white_contrast_at = band.map(|camera| {
         let half = exact(camera.frequencies().half_nyquist_lp_mm);
@@ -86,6 +89,9 @@ fn page(design: &Design, array: &PillarArray, found: &Verification, picture: Opt
         }
     }
     limits(&mut page, found);
+    if let Some(sample) = found.sampled() {
+        sampled::write(&mut page, sample, found.fidelity);
+    }
     for (k, element) in elements.into_iter().enumerate() {
         page.section(format!("Element {}", element.element.label()));
         if k > 0 {
@@ -185,6 +191,14 @@ fn limits(page: &mut Page, found: &Verification) {
 }
 
 fn method(page: &mut Page, design: &Design, found: &Verification) {
+    if let Some(none) = &found.not_simulated {
+        page.paragraph(format!(
+            "Design `{}`, digest `{}`. All figures are computed from the file that was read back.",
+            found.design, found.design_digest
+        ));
+        sampled::method(page, none);
+        return;
+    }
     if let Some(model) = &found.model {
         model_page::write(page, model);
     }

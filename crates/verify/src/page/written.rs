@@ -22,8 +22,8 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
         Column::number("Extra", ""),
         Column::text("Simulated as"),
     ]);
+    let nothing = found.not_simulated.is_some() && found.sampled().is_none();
     for check in &found.elements {
-        let copy = check.copy_of.and_then(|k| found.distinct.get(k));
         let turned = check.turned.filter(|s| *s != Symmetry::IDENTITY);
         let turned = turned.map_or_else(String::new, |s| format!(", (x, y) at {}", place_words(s)));
         table.row([
@@ -32,7 +32,11 @@ pub(super) fn write(page: &mut Page, design: &Design, found: &Verification) {
             Cell::from(count(check.widths.wrong)),
             Cell::from(count(check.widths.missing)),
             Cell::from(count(check.widths.extra)),
-            Cell::from(copy.map_or_else(|| "itself".into(), |d| d.element.label() + &turned)),
+            match found.simulated_as(check) {
+                Some(element) => Cell::from(element.label() + &turned),
+                None if nothing => Cell::none(),
+                None => Cell::from("itself"),
+            },
         ]);
     }
     page.table(table.caption(format!(

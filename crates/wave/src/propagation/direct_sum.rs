@@ -34,6 +34,13 @@ impl Direct {
         })
     }
 
+    /// The term of one site at `site_um`, x and y from the element's centre: the field at a point x, y, z (um) for a transmission of
+    /// one and a cell of unit area (1/um^2).
+    pub fn of_site(site_um: [f64; 2], point_um: [f64; 3], wave: &PlaneWave) -> Complex64 {
+        let ([x, y], [px, py, z]) = (site_um, point_um);
+        kernel([px - x, py - y, z], wave.wavelength_um, wave.turns(x, y))
+    }
+
     /// The field at places x, y, z (um) from the element's centre in the plane of the pillar tops.
     pub fn at(aperture: &dyn Aperture, wave: &PlaneWave, points_um: &[[f64; 3]]) -> Vec<Complex64> {
         let lattice = aperture.lattice();
@@ -63,11 +70,7 @@ fn row_sum(row: &[Complex32], lattice: &Lattice, iy: usize, wave: &PlaneWave, po
     let mut sum = Complex64::ZERO;
     for (ix, t) in row.iter().enumerate().filter(|(_, t)| **t != Complex32::ZERO) {
         let x = lattice.place_um(0, ix);
-        let way = kernel(
-            [point[0] - x, point[1] - y, point[2]],
-            wave.wavelength_um,
-            wave.turns(x, y),
-        );
+        let way = Direct::of_site([x, y], *point, wave);
         sum += Complex64::new(t.re.into(), t.im.into()) * way;
     }
     sum
