@@ -54,7 +54,7 @@ fn shard(text: &str) -> std::result::Result<PieceShard, String> {
     let numbers = text.split_once('/').map(|(number, of)| (number.parse(), of.parse()));
     match numbers {
         Some((Ok(number), Ok(of))) if (1..=of).contains(&number) => Ok(PieceShard { number, of }),
-        _ => Err("give the number of the shard and how many there are, as 1/4".into()),
+        _ => Err("give a number from 1 to that of all shards, and that number, as 1/4 to 4/4".into()),
     }
 }
 
@@ -293,6 +293,11 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
         compensation = Some((model, intended, compensated));
     }
     let pieces = args.kept_pieces(&design, terminal)?;
+    if let Some((kept, _)) = &pieces
+        && let found @ 1.. = kept.count()?
+    {
+        terminal.say(&format!("{} of earlier runs are taken", counted(found, "piece")));
+    }
     if let (Some((kept, encoding)), Some(shard)) = (&pieces, args.shard) {
         make_pieces(
             &design,
@@ -306,7 +311,11 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
         if args.json {
             print_json(&serde_json::json!({ "pieces": args.pieces, "shard": [shard.number, shard.of] }));
         } else if !terminal.is_quiet() {
-            print_line!("shard {} of {} is made", shard.number, shard.of);
+            print_line!(
+                "shard {} of {} is made; when all are, the same command without --shard writes the layout",
+                shard.number,
+                shard.of
+            );
         }
         return Ok(Outcome::Fine);
     }
@@ -327,7 +336,12 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     let written = args
         .target
-        .publish((&design, &array), &turn, &[], writer, report, terminal)?;
+        .publish((&design, &array), &turn, &[], writer, report, terminal);
+    if let (Err(_), Some((kept, _))) = (&written, &pieces) {
+        let made = counted(kept.count()?, "piece");
+        terminal.say(&format!("{made} kept: the same command goes on from there"));
+    }
+    let written = written?;
     if let Some((kept, _)) = pieces {
         kept.remove()?;
     }

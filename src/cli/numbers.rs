@@ -87,7 +87,7 @@ pub(super) fn hint(error: &clap::Error) -> Option<String> {
         Some(format!(": {value} is {}", number * factor))
     });
     Some(format!(
-        "give a number of {} without its unit{}",
+        "give a plain number of {}, such as 850 or 0.5{}",
         unit.name,
         in_unit.unwrap_or_default()
     ))
@@ -110,7 +110,7 @@ mod tests {
         told("new a.toml --diameter-um 20mm", "20mm is 20000");
         told("new a.toml --wavelength-nm 1.55um", "1.55um is 1550");
         told("verify a.toml b.gds --memory-mb 2GB", "2GB is 2000");
-        told("new a.toml --focal-length-um far", "without its unit");
+        told("new a.toml --focal-length-um far", "such as 850 or 0.5");
         assert_eq!(hint_of("new a.toml --diameter-um 20000"), None);
         assert_eq!(hint_of("new a.toml --diameter-um -5"), None);
         assert_eq!(hint_of("new a.toml --array 3"), None);

@@ -22,6 +22,9 @@ use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
 
+/// Memory that may be asked for at least (MB): below it, all that is larger is sampled.
+const LEAST_MEMORY_MB: f64 = 1.0;
+
 /// Name of the set of the files of the report.
 const REPORT: &str = "report";
 
@@ -123,6 +126,13 @@ impl Judging {
     /// # Errors
     /// If it could be neither simulated nor compared with its design, or its pillars cannot be judged by the cell.
     pub(crate) fn simulation(&self, design: &Design, path: &Path) -> Result<Simulation> {
+        if self.memory_mb.is_nan() || self.memory_mb < LEAST_MEMORY_MB {
+            return Err(Error::refused(
+                "option/memory-out-of-range",
+                format!("--memory-mb {}", self.memory_mb),
+                format!("give {LEAST_MEMORY_MB} MB or more"),
+            ));
+        }
         let fidelity = self.fidelity(design);
         design.check_fidelity(fidelity)?;
         if self.oblique && design.cell.shape.basis().is_some() {

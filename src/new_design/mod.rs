@@ -157,7 +157,10 @@ impl NewDesign {
 
     /// Refuse a wavelength that is one of micrometres, and a focal length or diameter that is one of millimetres beside the other.
     fn check_unit(&self) -> Result<()> {
-        let given = self.focal_length_um.zip(self.diameter_um);
+        let given = self
+            .focal_length_um
+            .zip(self.diameter_um)
+            .filter(|(f, d)| *f > 0.0 && *d > 0.0);
         let f_number = |(focal, diameter): (f64, f64)| focal / diameter;
         let is_off = |ratio: f64| ratio > 0.0 && ratio.is_finite() && !F_NUMBERS.contains(&ratio);
         if let Some((focal, diameter)) = given.filter(|given| is_off(f_number(*given))) {
@@ -182,7 +185,15 @@ impl NewDesign {
             Some(nm) if nm > 0.0 && nm < SHORTEST_NM => Err(Error::refused(
                 "new/out-of-range",
                 format!("a lens for {nm} nm"),
-                format!("nanometres are meant: {}?", (nm * 1e6).round() / 1e3),
+                // Shorter than a picometre it is in metres, else in micrometres.
+                format!(
+                    "nanometres are meant: {}?",
+                    if nm < 1e-3 {
+                        (nm * 1e12).round() / 1e3
+                    } else {
+                        (nm * 1e6).round() / 1e3
+                    }
+                ),
             )),
             _ => Ok(()),
         }

@@ -86,7 +86,7 @@ pub fn verify_sampled(
 ) -> Result<Verification> {
     let (facts, mut elements, extraction) = read_folded(design, array, path, progress)?;
     let sample = match cases.filter(|_| !array.compensated) {
-        Some(cases) => {
+        Some(cases) if extraction.pillars > 0 => {
             let widths: Vec<&dyn PillarRows> = extraction.elements.iter().map(|e| &e.widths as _).collect();
             Sample::Sampled(SampledZones::of(
                 design,
@@ -97,6 +97,7 @@ pub fn verify_sampled(
                 progress,
             )?)
         }
+        Some(_) => Sample::NotSampled("no pillar was read".into()),
         None => Sample::NotSampled("a chip as fabricated is simulated with all of its pillars in memory".into()),
     };
     let mut verification = Verification {

@@ -5,6 +5,7 @@ use std::path::Path;
 use metalith_core::Result;
 use metalith_design::{Design, Element, LensSpec};
 use metalith_gds::extract::{Holding, fits_folded, held_bytes};
+use metalith_report::counted;
 use metalith_wave::{Accuracy, FoldedPropagator, Window};
 
 use super::{optics, polychromatic};
@@ -68,8 +69,9 @@ impl Simulation {
         let least_mb = needed(spectra / MOST_PARTS as f64);
         if least_mb > memory_mb {
             return Ok(Self::Not(format!(
-                "in parts that takes about {least_mb:.0} MB of memory on {threads} threads, and --memory-mb allows \
-                 {memory_mb:.0}"
+                "in parts that takes about {least_mb:.0} MB of memory on {}, and --memory-mb allows \
+                 {memory_mb:.0}",
+                counted(rayon::current_num_threads(), "thread")
             )));
         }
         let part = (1e6 * (memory_mb - needed(0.0)) / threads).min(spectra);

@@ -91,6 +91,9 @@ pub(crate) struct NewArgs {
     like: Option<String>,
 }
 
+/// Lenses of a smaller diameter are rare, and may be meant in millimetres (um).
+const SMALL_UM: f64 = 40.0;
+
 /// A pitch.
 fn pitch(text: &str) -> Result<Pitch, String> {
     let nm: f64 = text
@@ -165,6 +168,13 @@ pub(crate) fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let folder = args.design.parent().unwrap_or(Path::new(""));
     let made = asked.text(&name, folder, terminal)?;
+    if let Some(um) = args.diameter_um.filter(|um| *um < SMALL_UM) {
+        terminal.clear();
+        terminal.say(&format!(
+            "note: a lens of {um} um; micrometres are meant, {um} mm is {}",
+            um * 1e3
+        ));
+    }
     if let Some(mapping) = &made.mapping {
         terminal.clear();
         terminal.say(mapping);

@@ -59,7 +59,12 @@ impl KeptPieces {
         };
         match fs::read(&key) {
             Ok(found) if found == layout.as_bytes() => return Ok(own),
-            Ok(_) => return refused(format!("{} holds pieces of another layout", folder.display())),
+            Ok(_) => {
+                return refused(format!(
+                    "{} holds pieces of another layout, or of another version: {KEY} in it says which",
+                    folder.display()
+                ));
+            }
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(Error::io("read", &key)(error)),
             Err(_) => {}
         }
@@ -72,6 +77,18 @@ impl KeptPieces {
         }
         AtomicFile::write(&key, layout.as_bytes())?;
         Ok(own)
+    }
+
+    /// Number of the pieces that are kept.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub fn count(&self) -> Result<usize> {
+        let entries = fs::read_dir(&self.folder).map_err(Error::io("read", &self.folder))?;
+        let is_piece = |path: &Path| path.extension().is_some_and(|ending| ending == ENDING);
+        Ok(entries
+            .filter(|entry| entry.as_ref().is_ok_and(|e| is_piece(&e.path())))
+            .count())
     }
 
     /// Remove the pieces, once their layout is in its place, and the folder, if nothing else is in it.
