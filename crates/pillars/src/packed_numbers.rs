@@ -37,7 +37,7 @@ impl PackedNumbers {
         }
     }
 
-    /// As many zeros, which become numbers that are mostly like these.
+    /// Zeros of the same number, to be replaced by numbers that are mostly like these.
     pub(crate) fn zero_like(&mut self) -> Self {
         let others = match self {
             Self::Shared(others) => others.clone(),

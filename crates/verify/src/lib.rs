@@ -156,7 +156,7 @@ pub struct Verification {
     /// Light of the design of which the lattice of the pillars sends some into oblique orders.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lattice_orders: Vec<LatticeOrders>,
-    /// What stands in place of a simulation, if there was none.
+    /// Reason why there is no full simulation, and the sample of zones in its place; none if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_simulated: Option<NotSimulated>,
     /// Every limit of the design, held or not.

@@ -33,11 +33,11 @@ pub use estimate::Estimate;
 const WINDOW_SAMPLES: usize = 32;
 /// Largest number of window steps in a wavelength over the numerical aperture.
 const MOST_STEPS: f64 = 8.0;
-/// Strehl ratio that is told from chance, in means of as many patches without any relation: among the samples of a window, one
-/// in 500 000 windows has more.
+/// Smallest Strehl ratio that is distinguished from chance, in means of as many patches without any relation: one in 500 000
+/// windows has a sample above it.
 const ABOVE_CHANCE: f64 = 20.0;
 
-/// What stands in place of the simulation of a layout.
+/// Reason why a layout is not simulated in full, and the sample of zones in its place.
 #[derive(Clone, Debug, Serialize)]
 pub struct NotSimulated {
     /// Reason why the elements were not simulated in full.
@@ -105,7 +105,7 @@ pub struct SampledSpot {
     pub strehl: SampledStrehl,
     /// Strehl ratio of the target phase at the same sites.
     pub target_strehl: SampledStrehl,
-    /// Strehl ratio of the layout over that of the target; none unless both are told.
+    /// Strehl ratio of the layout over the Strehl ratio of the target; none unless both are above chance.
     pub strehl_ratio: Option<Estimate>,
     /// Focusing efficiency of the layout; none without a focus of a known width in the window.
     pub focusing_efficiency: Option<Estimate>,
@@ -138,7 +138,7 @@ impl SampledSpot {
 }
 
 impl SampledZones {
-    /// Sample the elements of a layout as read, by the case that judges; elements are told which one they are sampled as.
+    /// Sample of the distinct elements of a layout as read, by the case that judges; `checks` gets the element that stands for each.
     ///
     /// # Errors
     /// If a cell has no answer at a wavelength, a direction is too steep, or the user stopped it.
