@@ -1,18 +1,14 @@
 #!/usr/bin/env bash
 # The Python package as a user gets it: installed into a fresh environment, its types checked, its tests, notebooks and examples run.
-# Usage: scripts/python.sh [FOLDER]; FOLDER holds the environment, target/ci/python if left out.
+# Usage: scripts/environments.sh, then scripts/python.sh.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-folder=${1:-target/ci/python}
-mkdir -p "$folder"
-folder=$(realpath "$folder")
-rm -rf "$folder/venv"
-python3 -m venv "$folder/venv"
-pip() { "$folder/venv/bin/pip" --disable-pip-version-check --quiet "$@"; }
+source scripts/step.sh
+folder=$(realpath target/ci/python)
+step "the Python package: installed, types checked, tests and examples, a study on a Dask cluster"
 
 # The tests of the workspace have compiled most of the wheel.
-MATURIN_PEP517_ARGS="--features as-tested" pip install ./python
-pip install -r scripts/requirements-python.txt
+MATURIN_PEP517_ARGS="--features as-tested" "$folder/venv/bin/pip" --disable-pip-version-check --quiet install ./python
 "$folder/venv/bin/mypy" --strict --cache-dir "$folder/mypy" python/examples python/tests
 "$folder/venv/bin/pyright" --project python --pythonpath "$folder/venv/bin/python"
 python3 scripts/notebooks.py check
