@@ -19,13 +19,11 @@ ROOT = Path(__file__).resolve().parent.parent
 # Run by `.ci/run`: each below 20 CPU s, but for the layouts of full size, studies, plans and calibrations, which hold what
 # users rely on most, and the test that an effect is the same in every command, a minute.
 FULL = {
-    # Layouts of full size, and the truth at equal orders.
+    # Layouts of full size.
     "golden_digests_of_the_full_size_designs",
-    "with_as_many_orders_it_is_the_truth",
     # Calibrations and plans.
     "a_displaced_part_of_every_lens_is_found",
     "what_is_planned_for_is_found_in_what_comes_back",
-    "what_measurements_cannot_split_is_named_with_what_can",
     # Studies and other work in shards.
     "pairs_of_shards_are_those_of_one_run",
     "starts_of_the_optimiser_are_runs_with_their_seeds",
@@ -36,8 +34,6 @@ FULL = {
     "a_limit_on_no_figure_is_told",
     # Chips as fabricated.
     "real_pillars_between_the_nodes_are_those_solved_exactly",
-    # The library of a cell.
-    "the_command_reports_on_a_cell_and_reuses_its_library",
 }
 # Played by other processes that tests start.
 STARTED = {"other_process"}

@@ -296,7 +296,7 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
     if let Some((kept, _)) = &pieces
         && let found @ 1.. = kept.count()?
     {
-        terminal.say(&format!("{} of earlier runs are taken", counted(found, "piece")));
+        terminal.say(&format!("{} made before, not made again", counted(found, "piece")));
     }
     if let (Some((kept, encoding)), Some(shard)) = (&pieces, args.shard) {
         make_pieces(

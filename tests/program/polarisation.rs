@@ -37,6 +37,7 @@ fn psf(layout: &Path, options: &[&str]) -> Result<Value, String> {
 
 /// `run` by the design and `psf` by its options simulate the same light, and the page says what of it is focused.
 #[test]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn a_design_and_options_name_the_same_light() {
     /// Both sample the peak at the same places; the aperture of `psf` is the circle around the pillars.
     const SAME: f64 = 1e-3;

@@ -143,7 +143,7 @@ fn what_is_planned_for_is_found_in_what_comes_back() {
 
 /// One distance in focus cannot distinguish a defocus from a source that is near; three distances do.
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn what_measurements_cannot_split_is_named_with_what_can() {
     let folder = tempfile::tempdir().unwrap();
     let bench = small_bench()

@@ -261,6 +261,11 @@ pub enum ExtractionError {
         rows: i64,
         pitch_nm: f64,
     },
+    /// Shapes of elements that a design gives, before the first pillar on their lattices.
+    #[error(
+        "none of the first {shapes} shapes on the pillar layer is a pillar on the lattices of the design: {reasons}"
+    )]
+    NotOfDesign { shapes: u64, reasons: String },
     #[error("a lattice of pitch {pitch_nm} nm about ({}, {}) nm", centre_nm[0], centre_nm[1])]
     Lattice { pitch_nm: f64, centre_nm: [f64; 2] },
 }
@@ -361,6 +366,7 @@ impl ExtractionError {
             Self::Groups { .. } => "extract/too-many-groups",
             Self::Scattered { .. } => "extract/shapes-scattered",
             Self::Sparse { .. } => "extract/sites-mostly-empty",
+            Self::NotOfDesign { .. } => "extract/not-of-design",
             Self::Lattice { .. } => "extract/pitch-out-of-range",
         }
     }
@@ -382,6 +388,10 @@ impl ExtractionError {
                     .into()
             }
             Self::Sparse { .. } => "this is no lens on a lattice; give the design to say where its elements are".into(),
+            Self::NotOfDesign { .. } => {
+                "give the design that this layout was made from; `metalith info LAYOUT` says what lenses it holds"
+                    .into()
+            }
             Self::Lattice { .. } => {
                 "lattices with a pitch of whole steps of 0.05 nm about a whole nanometre are read".into()
             }

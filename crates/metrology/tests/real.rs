@@ -42,6 +42,7 @@ fn diagnosis(name: &str, kind: SetKind) -> Option<Diagnosis> {
 }
 
 #[test]
+#[ignore = "second tier: two minutes of CPU time, in scripts/slow_tests.sh"]
 fn relief() {
     let Some(answer) = diagnosis("relief", SetKind::Heights) else {
         return;

@@ -168,6 +168,11 @@ impl PillarArray {
             progress.check_stopped()?;
             let rule = Arc::new(PillarRule::of_element(design, element.index));
             let computed = ComputedWidths::new(lens.clone(), along_y.clone(), rule, element);
+            let most_held = if computed.is_told_by_phase() {
+                by_phase
+            } else {
+                by_pillars
+            };
             // Where the phases of two elements say that they are copies, no pillar is made to see it.
             match array.copy(|class, symmetry| firsts[class].maps(symmetry, &computed)) {
                 Some((class, symmetry)) => array.placed.push(PlacedElement {
@@ -175,15 +180,7 @@ impl PillarArray {
                     class,
                     symmetry,
                 }),
-                None if sites
-                    <= if computed.is_told_by_phase() {
-                        by_phase
-                    } else {
-                        by_pillars
-                    } =>
-                {
-                    array.place(element, ClassPillars::Held(computed.map()));
-                }
+                None if sites <= most_held => array.place(element, ClassPillars::Held(computed.map())),
                 None => array.place(element, ClassPillars::Computed(computed.clone())),
             }
             if firsts.len() < array.classes.len() {

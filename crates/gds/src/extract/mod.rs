@@ -256,7 +256,7 @@ fn extract_from(
     let selection = plan.selection();
     let top = layout.roots(&selection)?[0];
     let turn = found.turn;
-    let mut pillars = PillarCollector::new(plan, found, Scale::of(layout)?, most);
+    let mut pillars = PillarCollector::new(layout.path(), plan, found, Scale::of(layout)?, most);
     visit_turned(
         layout,
         &selection,

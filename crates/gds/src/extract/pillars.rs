@@ -3,19 +3,28 @@
 use super::discover::Discovered;
 use super::filler::Filler;
 use super::named_shapes::name_of;
-use super::plan::{Extraction, ExtractionPlan, turned};
+use super::plan::{Elements, Extraction, ExtractionPlan, turned};
 use super::sites::Scale;
 use super::stored_pillars::StoredPillars;
 use super::survey::Surveyor;
 use super::unrecognised_shapes::{UnrecognisedShape, UnrecognisedShapes, Why};
 use crate::{
-    ExtractionError, LayerNumber, LayoutCell, OutlineMemo, PillarFinder, Rect, Shape, Text, Transform, Visitor,
+    Error, ExtractionError, LayerNumber, LayoutCell, OutlineMemo, PillarFinder, Rect, Shape, Text, Transform, Visitor,
     pillar_of,
 };
 use metalith_pillars::PillarShape;
+use std::path::{Path, PathBuf};
+
+/// Shapes before the first pillar of a design, after which the layout is taken for another design's: lenses of 1 mm have fewer, and
+/// seconds pass.
+const MOST_BEFORE_A_PILLAR: u64 = 10_000_000;
 
 /// Fills width maps from the shapes of a layout, and lists what is no pillar.
 pub(super) struct PillarCollector {
+    /// The layout that is read, for errors.
+    path: PathBuf,
+    /// True for elements that a design gives.
+    given: bool,
     layer: LayerNumber,
     shape: PillarShape,
     turned_deg: Option<f64>,
@@ -31,10 +40,12 @@ pub(super) struct PillarCollector {
 
 impl PillarCollector {
     /// Holds sites of at most so many bytes.
-    pub(crate) fn new(plan: &ExtractionPlan, found: Discovered, scale: Scale, most: u64) -> Self {
+    pub(crate) fn new(path: &Path, plan: &ExtractionPlan, found: Discovered, scale: Scale, most: u64) -> Self {
         let turned_deg = found.turned_deg();
         let Discovered { sites, shape, fits, .. } = found;
         Self {
+            path: path.to_owned(),
+            given: matches!(plan.elements, Elements::Given(_)),
             layer: plan.pillar_layer,
             shape,
             turned_deg,
@@ -62,14 +73,15 @@ impl PillarCollector {
 
     /// The square around a shape that may be a pillar.
     #[inline]
-    fn candidate(&mut self, r: &Rect, placement: usize, offset: u64) {
-        if let Err(why) = self.filler.put(r, placement, |_| true) {
-            self.odd(why, r, offset);
+    fn candidate(&mut self, r: &Rect, placement: usize, offset: u64) -> metalith_core::Result<()> {
+        match self.filler.put(r, placement, |_| true) {
+            Ok(_) => Ok(()),
+            Err(why) => self.odd(why, r, offset),
         }
     }
 
     #[cold]
-    fn odd(&mut self, why: Why, r: &Rect, offset: u64) {
+    fn odd(&mut self, why: Why, r: &Rect, offset: u64) -> metalith_core::Result<()> {
         let nm = |v: i64| self.scale.nm(v as f64);
         let oddity = UnrecognisedShape {
             why,
@@ -79,16 +91,26 @@ impl PillarCollector {
         };
         let in_element = self.filler.may_be_of_element(r);
         self.oddities.add(oddity, in_element, self.listed);
+        let shapes = self.oddities.total();
+        if self.given && shapes >= MOST_BEFORE_A_PILLAR && self.filler.pillars() == 0 {
+            let cause = ExtractionError::NotOfDesign {
+                shapes,
+                reasons: self.oddities.reasons(),
+            };
+            let path = self.path.clone();
+            return Err(Error::Extraction { path, cause }.into());
+        }
+        Ok(())
     }
 
     /// An outline that is no pillar by its box alone: it may be a rectangle with more vertices than it needs, become one where it
     /// is placed, or be told by its corners.
-    fn polygon(&mut self, shape: &Shape<'_>, placements: &[Transform]) {
+    fn polygon(&mut self, shape: &Shape<'_>, placements: &[Transform]) -> metalith_core::Result<()> {
         let unit_nm = self.scale.nm(1.0);
         for (k, placement) in placements.iter().enumerate() {
             if let Some(pillar) = self.finder.placed(shape, placement) {
                 if let Err(why) = self.filler.put_drawn(&pillar, k, |_| true) {
-                    self.odd(why, &pillar.around, shape.offset);
+                    self.odd(why, &pillar.around, shape.offset)?;
                 }
                 continue;
             }
@@ -102,8 +124,9 @@ impl PillarCollector {
                 self.names
                     .placed(shape.outline, &Transform::IDENTITY, || name_of(&placed))
             };
-            self.odd(why, &Rect::around(&placed), shape.offset);
+            self.odd(why, &Rect::around(&placed), shape.offset)?;
         }
+        Ok(())
     }
 }
 
@@ -128,14 +151,14 @@ impl Visitor for PillarCollector {
                 for (k, placement) in placements.iter().enumerate() {
                     // Not copied: this is the innermost loop of reading.
                     match placement.apply_rect(rect) {
-                        Some(placed) => self.candidate(&placed, k, shape.offset),
-                        None => self.candidate(rect, k, shape.offset),
+                        Some(placed) => self.candidate(&placed, k, shape.offset)?,
+                        None => self.candidate(rect, k, shape.offset)?,
                     }
                 }
+                Ok(())
             }
             _ => self.polygon(shape, placements),
         }
-        Ok(())
     }
 
     fn text(&mut self, text: &Text<'_>, placements: &[Transform]) -> metalith_core::Result<()> {

@@ -89,6 +89,14 @@ impl UnrecognisedShapes {
         self.by_why.iter().sum()
     }
 
+    /// Reasons with the number of shapes of each, the largest first.
+    pub(super) fn reasons(&self) -> String {
+        let mut found: Vec<(u64, Why)> = self.by_why.into_iter().zip(Why::ALL).filter(|(n, _)| *n > 0).collect();
+        found.sort_by_key(|(n, _)| std::cmp::Reverse(*n));
+        let words = found.iter().map(|(n, why)| format!("{n} {}", why.words()));
+        words.collect::<Vec<_>>().join(", ")
+    }
+
     pub(super) fn add(&mut self, oddity: UnrecognisedShape, in_element: bool, most: usize) {
         self.by_why[oddity.why as usize] += 1;
         if in_element {

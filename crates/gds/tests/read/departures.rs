@@ -344,4 +344,10 @@ fn compressed_files_are_read() {
     assert!(matches!(cause(open(&bomb)), LayoutError::Unpacked { .. }));
     let binary = open(b"AutoCAD Binary DXF\r\n\x1a\0");
     assert!(matches!(cause(binary), LayoutError::OtherFormat { .. }));
+    for design in [
+        &b"# A lens.\n\n[array]\nrows = 3\n"[..],
+        b"schema = 1\nname = \"lens\"\n",
+    ] {
+        assert!(matches!(cause(open(design)), LayoutError::OtherFormat { .. }));
+    }
 }

@@ -389,3 +389,30 @@ fn elements_are_discovered() {
         ]
     );
 }
+
+/// A layout of another design is refused before all of it is read; a million shapes less are counted.
+#[test]
+fn a_layout_of_another_design_is_refused_early() {
+    let read = |rows: i16| {
+        let mut gds = Gds::library();
+        gds.cell("PILLAR").square(1, 0, 0, 100).end_cell();
+        let (columns, pitch) = (4000, 500);
+        let [across, up] = [columns, rows].map(|n| i32::from(n) * pitch);
+        gds.cell("TOP")
+            .array("PILLAR", columns, rows, [0, 0, across, 0, 0, up])
+            .end_cell();
+        let site = ElementSite {
+            name: "lens".into(),
+            centre_nm: [-1_000_000, 0],
+            lattice: Lattice::new(350, 24).unwrap(),
+            within_nm: None,
+        };
+        let plan = ExtractionPlan::given(PILLARS, vec![site]);
+        extract(&layout(gds.end()), &plan, &Silent)
+    };
+    let fewer = read(2250).unwrap();
+    assert_eq!((fewer.pillars, fewer.oddities.total()), (0, 9_000_000));
+    let refused = metalith_core::Error::from(read(2501).unwrap_err());
+    let text = refused.to_string();
+    assert!(text.contains("10000000 outside every element"), "{text}");
+}
