@@ -18,8 +18,8 @@ use metalith_core::text::printable_bytes;
 use metalith_core::{Error, Progress, Result};
 use metalith_gds::extract::{Discovered, Filler, Scale, Why};
 use metalith_gds::{
-    BoxMemo, DrawnPillar, LayerNumber, Layout, LayoutCell, Outline, OutlineMemo, PillarFinder, Point, Rect, Selection,
-    Shape, Text, Transform, Visitor, circle_of, rectangle_of, simplified,
+    BoxMemo, DrawnPillar, ExtractionError, LayerNumber, Layout, LayoutCell, Outline, OutlineMemo, PillarFinder, Point,
+    Rect, Selection, Shape, Text, Transform, Visitor, circle_of, rectangle_of, simplified,
 };
 use metalith_pillars::{OutlineForm, PillarShape};
 
@@ -73,6 +73,7 @@ pub(super) fn gather<'a>(
         loose: BTreeMap::new(),
         vertices: 0,
         rects: 0,
+        given: input.design.is_some(),
         off_lattice: Vec::new(),
         odd_on_lattice: 0,
         pillar_shapes: 0,
@@ -179,6 +180,8 @@ struct Gather<'r, 'p> {
     filler: Filler,
     loose: BTreeMap<LayerNumber, LooseShapes>,
     rects: u64,
+    /// True if a design gives the elements.
+    given: bool,
     vertices: u64,
     off_lattice: Vec<Rect>,
     odd_on_lattice: u64,
@@ -345,6 +348,22 @@ impl Gather<'_, '_> {
         }
     }
 
+    /// Check that pillars stand where the design has elements, before all of a large layout is read.
+    ///
+    /// # Errors
+    /// If more rectangles than are kept stand elsewhere, and no pillar does there.
+    #[inline]
+    fn check_of_design(&self) -> Result<()> {
+        if !self.given || self.rects <= self.allowance.rects || self.filler.pillars() > 0 {
+            return Ok(());
+        }
+        let cause = ExtractionError::NotOfDesign {
+            shapes: self.rects,
+            reasons: "all stand elsewhere".into(),
+        };
+        Err(Error::refused(cause.id(), cause.to_string(), cause.remedy()))
+    }
+
     fn keep_rect(&mut self, layer: LayerNumber, r: &Rect) {
         let small = [r.x0, r.y0, r.x1, r.y1].map(i32::try_from);
         let [Ok(x0), Ok(y0), Ok(x1), Ok(y1)] = small else {
@@ -423,7 +442,7 @@ impl Visitor for Gather<'_, '_> {
                     None => self.pillar(rect, k),
                 }
             }
-            return Ok(());
+            return self.check_of_design();
         }
         self.other(shape, placements, square)
     }

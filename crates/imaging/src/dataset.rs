@@ -255,9 +255,9 @@ pub fn write_dataset_manifest(folder: &Path, manifest: &DatasetManifest) -> Resu
 }
 
 /// Writer of the pairs of a set.
-pub struct PairWriter<'a> {
+pub struct PairWriter<'a, 'o> {
     system: &'a ImagingSystem,
-    operator: &'a FrameOperator<'a>,
+    operator: &'a FrameOperator<'o>,
     seed: u64,
     folder: &'a Path,
     /// Digest of chip and camera.
@@ -265,9 +265,9 @@ pub struct PairWriter<'a> {
     levels: FrameLevels,
 }
 
-impl<'a> PairWriter<'a> {
+impl<'a, 'o> PairWriter<'a, 'o> {
     /// Writer for the simulation of an imaging system, noise of a seed, and a folder.
-    pub fn new(system: &'a ImagingSystem, operator: &'a FrameOperator<'a>, seed: u64, folder: &'a Path) -> Self {
+    pub fn new(system: &'a ImagingSystem, operator: &'a FrameOperator<'o>, seed: u64, folder: &'a Path) -> Self {
         Self {
             system,
             operator,

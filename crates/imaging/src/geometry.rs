@@ -65,6 +65,11 @@ impl SceneSpace {
         }
     }
 
+    /// True for a plane, false for a scene with a distance of each pixel.
+    pub(crate) fn is_flat(&self) -> bool {
+        self.depth.is_none()
+    }
+
     /// Space of a scene with the distance of each pixel (um, positive).
     pub fn with_depth(view: &SceneView, um: &Array2<f32>) -> Self {
         let ends = um.iter().fold([f32::MAX, 0.0f32], |[a, b], v| [a.min(*v), b.max(*v)]);

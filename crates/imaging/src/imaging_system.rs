@@ -273,7 +273,7 @@ impl ImagingSystem {
 
     fn recorded<'a>(
         &'a self,
-        operator: &'a FrameOperator<'a>,
+        operator: &'a FrameOperator<'_>,
         light: &'a [Array2<f32>],
         inverse_variance: &'a [Array2<f32>],
     ) -> Recorded<'a> {

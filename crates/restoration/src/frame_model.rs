@@ -28,6 +28,12 @@ pub trait FrameModel: Sync {
     /// True if the planes of a picture are red, green and blue; else each is a grey picture.
     fn sees_colours(&self) -> bool;
 
+    /// A model of the same field with fewer pixels in frame and picture, and the pixels an axis of this frame that one of its is the
+    /// mean of; `None` if there is none.
+    fn coarse(&self) -> Option<(usize, &dyn FrameModel)> {
+        None
+    }
+
     /// The frame of a picture behind some of the elements, with or without the stray light of all.
     fn apply_elements(&self, picture: &[Array2<f32>], elements: &[usize], stray_light: bool) -> Planes;
 

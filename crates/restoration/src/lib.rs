@@ -12,6 +12,7 @@
 //! | random scenes of objects that hide one another | `leaf_scene` |
 //! | which methods there are | `method` |
 //! | Tikhonov: the most likely picture where light is normal, as a Wiener filter has it | `tikhonov` |
+//! | a picture of a coarse model in more pixels | `enlarge` |
 //! | total variation, by the alternating direction method of multipliers | `total_variation`, `slope_split` |
 //! | Richardson and Lucy | `richardson_lucy` |
 //! | half-quadratic splitting with any denoiser | `half_quadratic`, `denoiser` |
@@ -24,6 +25,7 @@
 //! `normal_system`, and `precondition` makes them easier.
 
 mod denoiser;
+mod enlarge;
 mod frame_fit;
 mod frame_model;
 mod half_quadratic;

@@ -9,7 +9,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::frame_model::{FrameModel, Planes};
-use crate::precondition::Preconditioner;
+use crate::precondition::{Preconditioner, RESPONSE};
 use crate::scene_statistics::{SceneStatistics, Terms};
 use crate::slope_split::bends;
 
@@ -38,6 +38,8 @@ pub(crate) struct NormalSystem<'a> {
     term: DataTerm<'a>,
     /// A* W S.
     pub data: Planes,
+    /// W S.
+    products: Planes,
     /// Unit of the data term, in units of the inverse variance of the picture.
     pub scale: f64,
     preconditioner: Preconditioner,
@@ -45,6 +47,11 @@ pub(crate) struct NormalSystem<'a> {
 
 /// A place that sends less light than this share of the best is preconditioned as if it sent so much.
 const LEAST_SHARE: f32 = 0.02;
+
+/// Trust in a pixel of a coarse frame over that in all pixels together that it is the mean of: the coarse model takes fine detail for
+/// coarse, and errs alike at all of them. Of 1, 0.25 and 0.05 two photographs of 800 x 800 have 19.62, 19.84 and 19.80 dB of sRGB values
+/// after 48 steps on the coarse model and 32 on the model itself, and 22.77, 22.74 and 22.56 dB of linear light.
+const COARSE_TRUST: f32 = 0.25;
 
 impl<'a> NormalSystem<'a> {
     /// System of light and inverse variance of each pixel, for some of the elements, with or without the stray light.
@@ -54,12 +61,23 @@ impl<'a> NormalSystem<'a> {
         elements: &[usize],
         stray_light: bool,
     ) -> Self {
+        let products: Planes = inverse_variance.iter().zip(light_seen).map(|(w, s)| w * s).collect();
+        Self::of_products(operator, [&products, inverse_variance], elements, stray_light)
+    }
+
+    /// System of the light of each pixel over its variance, and the inverse of the variance.
+    fn of_products(
+        operator: &'a dyn FrameModel,
+        [products, inverse_variance]: [&[Array2<f32>]; 2],
+        elements: &[usize],
+        stray_light: bool,
+    ) -> Self {
         let sums = operator.row_sums(inverse_variance, elements, stray_light);
         let mut light = Array2::<f32>::zeros(operator.picture_shape());
         sums.iter().for_each(|p| light.scaled_add(1.0 / sums.len() as f32, p));
         let most = light.iter().copied().fold(0.0f32, f32::max).max(f32::MIN_POSITIVE);
-        let weight: Planes = inverse_variance.iter().map(|t| t.mapv(|v| v / most)).collect();
-        let products: Planes = weight.iter().zip(light_seen).map(|(w, s)| w * s).collect();
+        let [weight, products] =
+            [inverse_variance, products].map(|planes| planes.iter().map(|p| p / most).collect::<Planes>());
         let statistics = if operator.sees_colours() {
             SceneStatistics::colours()
         } else {
@@ -77,10 +95,33 @@ impl<'a> NormalSystem<'a> {
             data: term
                 .statistics
                 .adjoint(&operator.adjoint_elements(&products, elements, stray_light)),
+            products,
             scale: f64::from(most),
             preconditioner: Preconditioner::new(&share, operator.inputs(), |x| term.apply(x)),
             term,
         }
+    }
+
+    /// The same system for the coarse model of the frame, if it has one.
+    pub(crate) fn coarse(&self) -> Option<NormalSystem<'a>> {
+        let (side, operator) = self.term.operator.coarse()?;
+        let sums = |planes: &Planes| {
+            planes
+                .iter()
+                .map(|p| sums_of_blocks(p, side) * COARSE_TRUST)
+                .collect::<Planes>()
+        };
+        let known = [&self.products, &self.term.weight].map(sums);
+        let coarse = Self::of_products(
+            operator,
+            known.each_ref().map(|planes| &planes[..]),
+            &self.term.elements,
+            self.term.stray_light,
+        );
+        Some(Self {
+            scale: self.scale * coarse.scale,
+            ..coarse
+        })
     }
 
     /// Rows and columns of the picture.
@@ -114,6 +155,22 @@ impl<'a> NormalSystem<'a> {
     /// If the user stopped it.
     pub(crate) fn solve(
         &self,
+        x: Planes,
+        right: &[Array2<f32>],
+        terms: Terms,
+        iterations: usize,
+        progress: &dyn Progress,
+    ) -> Result<Planes> {
+        self.solve_by(RESPONSE, x, right, terms, iterations, progress)
+    }
+
+    /// The same with another share of the mean response in the preconditioner than [`RESPONSE`].
+    ///
+    /// # Errors
+    /// If the user stopped it.
+    pub(crate) fn solve_by(
+        &self,
+        response: f64,
         mut x: Planes,
         right: &[Array2<f32>],
         terms: Terms,
@@ -129,7 +186,7 @@ impl<'a> NormalSystem<'a> {
         let sizes = self.statistics().sizes();
         let planes = sizes.iter().enumerate();
         let filters: Vec<Vec<f32>> = planes
-            .map(|(plane, size)| self.preconditioner.filter(plane, of_plane(*size)))
+            .map(|(plane, size)| self.preconditioner.filter(plane, of_plane(*size), response))
             .collect();
         let mut z = self.preconditioner.apply(&residual, &filters);
         let mut direction = z.clone();
@@ -170,6 +227,15 @@ fn dot(a: &[Array2<f32>], b: &[Array2<f32>]) -> f64 {
     };
     let of_planes: Vec<f64> = a.par_iter().zip(b).map(of_plane).collect();
     of_planes.iter().sum()
+}
+
+/// Sums over blocks of `side` values an axis.
+fn sums_of_blocks(values: &Array2<f32>, side: usize) -> Array2<f32> {
+    let mut sums = Array2::zeros([values.nrows(), values.ncols()].map(|n| n.div_ceil(side)));
+    for ((y, x), value) in values.indexed_iter() {
+        sums[[y / side, x / side]] += value;
+    }
+    sums
 }
 
 fn add_prior(to: &mut Array2<f32>, x: &Array2<f32>, terms: Terms) {

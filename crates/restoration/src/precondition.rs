@@ -30,10 +30,10 @@ const BORDER: usize = 40;
 /// (17.7, 18.1 and 18.3 dB).
 const FLAT: f64 = 1e-2;
 
-/// Share of the mean response that is added. Of 1e-4, 3e-4 and 1e-3 a camera with all of its physics has the most of a
+/// Share of the mean response that is added for steps from black. Of 1e-4, 3e-4 and 1e-3 a camera with all of its physics has the most of a
 /// photograph of 800 x 800 with the last (22.1, 22.4 and 22.9 dB of linear light after 48 steps), and one of one kernel
 /// for each element and colour with the first (28.5 and 27.4 dB with 1e-4 and 1e-3).
-const RESPONSE: f64 = 5e-4;
+pub(crate) const RESPONSE: f64 = 5e-4;
 /// Power of the light of a place by which the inverse is weighed on both sides. Half of one is that of the data alone: of 0.5,
 /// 0.65 and 0.8 a photograph has 21.5, 21.7 and 21.7 dB of linear light after 32 steps; the camera of one kernel has 2 dB
 /// less with 0.8 than with 0.65.
@@ -104,8 +104,8 @@ impl Preconditioner {
         self.fft.of_plane(plane, &mut FftScratch::default())
     }
 
-    /// One over the prior and a share of the response, for each frequency of a plane's spectrum.
-    pub(crate) fn filter(&self, plane: usize, terms: Terms) -> Vec<f32> {
+    /// One over the prior and a share `added` of the response, for each frequency of a plane's spectrum.
+    pub(crate) fn filter(&self, plane: usize, terms: Terms, added: f64) -> Vec<f32> {
         let response = &self.response[plane];
         let size = self.fft.size();
         let squared = squared_frequencies(size);
@@ -118,7 +118,7 @@ impl Preconditioner {
             match most {
                 // Nothing is known of the picture.
                 0.0 => 1.0,
-                _ => 1.0 / (terms.slopes * s + terms.bends * s * s + terms.identity + FLAT * most + RESPONSE * mean),
+                _ => 1.0 / (terms.slopes * s + terms.bends * s * s + terms.identity + FLAT * most + added * mean),
             }
         };
         (0..self.fft.entries()).map(|i| of(i) as f32).collect()

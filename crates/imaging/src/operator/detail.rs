@@ -23,6 +23,9 @@ pub enum ScenePoints {
     /// One for a square of two by two pixels, of a scene without what is finer; with a colour filter array light is then
     /// found for the pixels alone that count a channel.
     OneASquare,
+    /// One for a block of four by four pixels, of a scene without what is finer; the frame holds the mean of a block's pixels
+    /// that count a channel.
+    OneABlock,
 }
 
 impl ScenePoints {
@@ -31,14 +34,28 @@ impl ScenePoints {
         match self {
             Self::FourAPixel | Self::OneAPixel => 1,
             Self::OneASquare => 2,
+            Self::OneABlock => 4,
         }
+    }
+
+    /// Pixels an axis that are one value of the frame.
+    pub fn value(self) -> usize {
+        match self {
+            Self::FourAPixel | Self::OneAPixel | Self::OneASquare => 1,
+            Self::OneABlock => self.cell(),
+        }
+    }
+
+    /// Values of the frame from one cell to the next.
+    pub(crate) fn frame_step(self) -> usize {
+        self.cell() / self.value()
     }
 
     /// Points of a cell from its middle along x and y (pixels).
     pub fn offsets(self) -> &'static [[f64; 2]] {
         match self {
             Self::FourAPixel => &[[-0.25, -0.25], [0.25, -0.25], [-0.25, 0.25], [0.25, 0.25]],
-            Self::OneAPixel | Self::OneASquare => &[[0.0; 2]],
+            Self::OneAPixel | Self::OneASquare | Self::OneABlock => &[[0.0; 2]],
         }
     }
 }
@@ -54,7 +71,7 @@ pub struct Detail {
     pub inputs: SceneInputs,
     pub assumed: ApproximationSet,
     /// Variation of the inputs with one another: planes (rows) from independent ones (columns). With it the stored
-    /// kernels are as few mixtures as see the same to 0.2 % of the light.
+    /// kernels are as few mixtures as see the same to 0.5 % of the light.
     pub statistics: Option<DMatrix<f64>>,
 }
 

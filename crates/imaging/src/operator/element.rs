@@ -21,7 +21,7 @@ pub(crate) struct ElementOperator<'a> {
     view: ElementView,
     pub(super) source: KernelSource<'a>,
     sensor: Sensor,
-    /// Share of its light that each pixel of the sensor counts; none if every pixel counts all of it.
+    /// Share of its light that each value of the frame counts; none if all count all of it.
     accepted: Option<Array2<f32>>,
     scene: SceneSpace,
     pub(super) channels: Vec<ChannelPlan>,
@@ -140,8 +140,9 @@ impl<'a> ElementOperator<'a> {
         scratch: &mut FftScratch,
     ) -> Vec<Complex32> {
         let bases = self.source.inputs(channel)[at.input].1.clone();
-        let phase = self.source.phases(channel)[at.phase];
-        let kernel = self.source.pixels(self.element, node, channel, bases, at.point, phase);
+        let kernel = self
+            .source
+            .pixels(self.element, node, channel, bases, at.point, at.phase);
         let (side, size) = (2 * self.source.reach() + 1, fft.size());
         let mut square = vec![0.0; size * size];
         for (row, to) in kernel.chunks_exact(side).zip(square.chunks_exact_mut(size)) {
@@ -222,10 +223,10 @@ impl<'a> ElementOperator<'a> {
     /// Add the light of pixels to the places of the scene that they look at, as if nothing were blurred: a plane for each
     /// channel.
     pub(crate) fn lay_on_scene(&self, frames: &[Array2<f32>], planes: &mut [Array2<f32>]) {
-        let cell = self.source.points.cell();
+        let step = self.source.points.frame_step();
         for (channel, plan) in self.channels.iter().enumerate() {
             let Some(warp) = plan.warps.first() else { continue };
-            let grids = self.source.phases(channel).iter().map(|p| warp.pixels(cell, *p, 0));
+            let grids = self.source.phases(channel).iter().map(|p| warp.pixels(step, *p, 0));
             let mut light = vec![0.0; warp.shape[0] * warp.shape[1]];
             for grid in grids {
                 let own = self.counted(&grid, &frames[channel]);

@@ -29,7 +29,7 @@ fn rectangles(node: &NodePlan, columns: usize, reach: usize) -> [Rectangle; 2] {
 impl ElementOperator<'_> {
     /// The sub-images of planes of the scene.
     pub(crate) fn apply(&self, scene: &[Array2<f32>], scratch: &mut FftScratch) -> Vec<SubImage> {
-        let (reach, cell) = (self.source.reach(), self.source.points.cell());
+        let (reach, step) = (self.source.reach(), self.source.points.frame_step());
         let mut images = Vec::new();
         for (channel, plan) in self.channels.iter().enumerate() {
             let warps = self.warps(channel, plan);
@@ -37,7 +37,7 @@ impl ElementOperator<'_> {
             let planes: Vec<_> = inputs.iter().map(|(input, _)| &scene[*input]).collect();
             // By point and input.
             let sampled: Vec<Vec<Vec<f32>>> = warps.iter().map(|warp| warp.sample(&planes)).collect();
-            let wide = warps[0].pixels(cell, [0; 2], reach).shape;
+            let wide = warps[0].pixels(step, [0; 2], reach).shape;
             let (size, entries) = (plan.fft.size(), plan.fft.entries());
             let mut own = vec![vec![0.0f32; wide[0] * wide[1]]; phases.len()];
             let mut square = vec![0.0; size * size];
@@ -76,7 +76,7 @@ impl ElementOperator<'_> {
                 }
             }
             images.extend(phases.iter().zip(own).map(|(phase, mut light)| {
-                let grid = warps[0].pixels(cell, *phase, reach);
+                let grid = warps[0].pixels(step, *phase, reach);
                 self.accept(&grid, &mut light);
                 SubImage { channel, grid, light }
             }));
@@ -92,13 +92,13 @@ impl ElementOperator<'_> {
         inputs: usize,
         scratch: &mut FftScratch,
     ) -> Vec<Array2<f32>> {
-        let (reach, cell) = (self.source.reach(), self.source.points.cell());
+        let (reach, step) = (self.source.reach(), self.source.points.frame_step());
         let mut planes = vec![Array2::zeros(shape); inputs];
         for (channel, plan) in self.channels.iter().enumerate() {
             let warps = self.warps(channel, plan);
             let (own, phases) = (self.source.inputs(channel), self.source.phases(channel));
             let (size, entries) = (plan.fft.size(), plan.fft.entries());
-            let gather = |phase: &[usize; 2]| self.counted(&warps[0].pixels(cell, *phase, reach), &frames[channel]);
+            let gather = |phase: &[usize; 2]| self.counted(&warps[0].pixels(step, *phase, reach), &frames[channel]);
             let images: Vec<Vec<f32>> = phases.iter().map(gather).collect();
             let [rows, columns] = warps[0].shape;
             // By point and input.

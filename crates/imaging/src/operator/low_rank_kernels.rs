@@ -13,9 +13,9 @@ pub(crate) struct MixedKernels {
     entries: usize,
 }
 
-/// Light of scenes that mixtures may leave out (root mean square, of all): a fifth of what the operator of a restoration errs
-/// by for other reasons.
-const LEFT_OUT: f64 = 2e-3;
+/// Light of scenes that mixtures may leave out (root mean square, of all). The operator of a restoration errs by 1.17, 0.85 and 0.69 %
+/// with 2e-3, and by 1.18, 0.87 and 0.72 % with 1e-2, with which three photographs lack 0.02 dB.
+const LEFT_OUT: f64 = 5e-3;
 
 impl MixedKernels {
     /// Mixtures of spectra of `size` frequencies an axis, by phase and input. Inputs are taken to vary with the

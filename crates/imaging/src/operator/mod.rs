@@ -29,11 +29,12 @@ mod sub_image;
 mod warp;
 
 use std::borrow::Cow;
+use std::sync::OnceLock;
 
 use metalith_restoration::{FrameModel, Planes};
 use metalith_sensor::Camera;
 use metalith_wave::kernels::{FftScratch, box_sums};
-use ndarray::Array2;
+use ndarray::{Array2, Axis, Slice};
 use rayon::prelude::*;
 
 use crate::acceptance::Acceptance;
@@ -56,6 +57,69 @@ pub struct FrameOperator<'a> {
     elements: Vec<ElementOperator<'a>>,
     stray_light: Cow<'a, StrayLight>,
     smoothing: Smoothing,
+    /// Pixels an axis that are one value of the frame.
+    value: usize,
+    /// What the coarse operator is made of, if there is one, and the operator once it was asked for.
+    coarse: Option<CoarseParts<'a>>,
+    made: OnceLock<Box<FrameOperator<'a>>>,
+}
+
+/// What a [`FrameOperator`] is made of.
+struct CoarseParts<'a> {
+    bank: &'a KernelBank,
+    stray_light: &'a StrayLight,
+    elements: Vec<ElementView>,
+    camera: Camera,
+    space: SceneSpace,
+    detail: Detail,
+}
+
+/// Pixels of the scene from square to square that a coarse operator is for: with fewer its picture lacks detail that the frame has, and
+/// few steps do not bring it back. Pictures of 800 x 800 over 80 and 90 degrees behind `cameras/gt1930.toml` have 2.3 and 2.0.
+const LEAST_STEP: f64 = 1.5;
+
+impl<'a> CoarseParts<'a> {
+    /// Parts of the operator with blocks in place of squares, and pictures of half as many rows and columns. None for other grids,
+    /// where squares are less than [`LEAST_STEP`] pixels of the scene apart, and where one kernel is taken for a field.
+    fn of(
+        (bank, stray_light): (&'a KernelBank, &'a StrayLight),
+        elements: &[ElementView],
+        camera: &Camera,
+        space: &SceneSpace,
+        detail: &Detail,
+        step: f64,
+    ) -> Option<Self> {
+        let view = &space.view;
+        let columns = view.columns.div_ceil(2);
+        let view = SceneView {
+            rows: (view.rows * columns).div_ceil(view.columns),
+            columns,
+            ..*view
+        };
+        let frame_limits = step >= LEAST_STEP && !detail.assumed.fixed_kernels;
+        (detail.points == ScenePoints::OneASquare && space.is_flat() && frame_limits).then(|| Self {
+            bank,
+            stray_light,
+            elements: elements.to_vec(),
+            camera: camera.clone(),
+            space: SceneSpace::flat(&view),
+            detail: Detail {
+                points: ScenePoints::OneABlock,
+                ..detail.clone()
+            },
+        })
+    }
+
+    fn operator(&self) -> FrameOperator<'a> {
+        FrameOperator::new(
+            self.bank,
+            self.stray_light,
+            &self.elements,
+            &self.camera,
+            &self.space,
+            self.detail.clone(),
+        )
+    }
 }
 
 impl<'a> FrameOperator<'a> {
@@ -75,20 +139,23 @@ impl<'a> FrameOperator<'a> {
         let source = KernelSource::new(bank, &detail, sensor, &names);
         // Pixels of the scene from one point to the next, in the middle of the field.
         let step = match elements.first() {
-            Some(element) if detail.points == ScenePoints::OneASquare => {
+            Some(element) if detail.points.cell() > 1 => {
                 sensor.pixel_um * detail.points.cell() as f64 / (element.sensor_um * view.pixel())
             }
             _ => 0.0,
         };
+        let coarse = CoarseParts::of((bank, stray_light), elements, camera, space, &detail, step);
+        let value = detail.points.value();
         let acceptance = Acceptance::new(elements, sensor);
+        let accepted = |i: usize| acceptance.over_sensor(i).map(|shares| means_of_blocks(&shares, value));
         let elements = elements
             .par_iter()
             .enumerate()
-            .map(|(i, e)| ElementOperator::new(i, e, &source, (sensor, acceptance.over_sensor(i)), space))
+            .map(|(i, e)| ElementOperator::new(i, e, &source, (sensor, accepted(i)), space))
             .collect();
         Self {
             view: *view,
-            frame: [sensor.rows as usize, sensor.columns as usize],
+            frame: [sensor.rows, sensor.columns].map(|n| (n as usize).div_ceil(value)),
             channels: bank.channel_um.len(),
             stray_light: match &detail.inputs {
                 SceneInputs::Spectra(_) => Cow::Borrowed(stray_light),
@@ -97,6 +164,9 @@ impl<'a> FrameOperator<'a> {
             inputs: detail.inputs,
             elements,
             smoothing: Smoothing::new(step),
+            value,
+            coarse,
+            made: OnceLock::new(),
         }
     }
 
@@ -123,7 +193,7 @@ impl<'a> FrameOperator<'a> {
                     cells.iter_mut().zip(own).for_each(|(c, v)| *c += v);
                 }
             }
-            stray_light::lay(&cells, self.stray_light.cells, frame);
+            stray_light::lay(&cells, self.stray_light.cells, self.value, frame);
         });
     }
 
@@ -167,6 +237,16 @@ impl<'a> FrameOperator<'a> {
     }
 }
 
+/// Means over blocks of `side` values an axis.
+fn means_of_blocks(values: &Array2<f32>, side: usize) -> Array2<f32> {
+    let shape = [values.nrows(), values.ncols()].map(|n| n.div_ceil(side));
+    Array2::from_shape_fn(shape, |(y, x)| {
+        let own = |i: usize, n: usize| Slice::from(i * side..((i + 1) * side).min(n));
+        let rows = values.slice_axis(Axis(0), own(y, values.nrows()));
+        rows.slice_axis(Axis(1), own(x, values.ncols())).mean().unwrap_or(0.0)
+    })
+}
+
 /// Light in each pixel, by channel: share of a channel's light that arrives at a lens from a unit of projected solid
 /// angle of a white surface.
 impl FrameModel for FrameOperator<'_> {
@@ -195,6 +275,12 @@ impl FrameModel for FrameOperator<'_> {
 
     fn sees_colours(&self) -> bool {
         matches!(&self.inputs, SceneInputs::Spectra(spectra) if spectra.len() == 3)
+    }
+
+    fn coarse(&self) -> Option<(usize, &dyn FrameModel)> {
+        let parts = self.coarse.as_ref()?;
+        let operator = self.made.get_or_init(|| Box::new(parts.operator()));
+        Some((operator.value, &**operator))
     }
 
     fn apply_elements(&self, scene: &[Array2<f32>], elements: &[usize], stray_light: bool) -> Planes {
@@ -237,7 +323,7 @@ impl FrameModel for FrameOperator<'_> {
         if stray_light {
             let lifted: Vec<Vec<f64>> = frames
                 .par_iter()
-                .map(|f| stray_light::lift(f, self.stray_light.cells))
+                .map(|f| stray_light::lift(f, self.stray_light.cells, self.value))
                 .collect();
             planes.par_iter_mut().enumerate().for_each(|(input, plane)| {
                 let mut cells = vec![0.0; stray_light::SCENE_CELLS * stray_light::SCENE_CELLS];

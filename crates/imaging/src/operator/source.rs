@@ -28,15 +28,12 @@ pub(crate) struct KernelSource<'a> {
     pub spec: BankSpec,
     pub between: BetweenNodes,
     node_step: usize,
-    /// Pixels of a cell that each channel counts, row and column.
-    phases: Vec<Vec<[usize; 2]>>,
+    /// Pixels of a square of the colour filter, or of a cell of one pixel, that each channel counts, row and column.
+    counted: Vec<Vec<[usize; 2]>>,
 }
 
 /// Lobes of [`lanczos`] on both sides.
 pub(crate) const LOBES: usize = 3;
-/// Points on both sides of a square of two by two pixels, half a pixel apart, that its light is spread over between it and
-/// its neighbours.
-const SPREAD: usize = 4 * LOBES;
 
 /// Interpolation (Duchon, J. Appl. Meteorol. 18, 1016 (1979)): the weight of a value at a distance in steps of the grid, no
 /// more than three steps away. Waves of four steps keep 99 % of their height; a cubic of two steps leaves 88 %.
@@ -49,13 +46,22 @@ pub(crate) fn lanczos(distance: f64) -> f64 {
     }
 }
 
-/// Weights of the points about a square, a quarter of a step of its grid apart; an even scene stays exactly even.
-fn spread() -> Vec<f32> {
-    let place = |k: usize| 0.25 * (k as f64 + 0.5 - SPREAD as f64);
-    let plain: Vec<f64> = (0..2 * SPREAD).map(|k| lanczos(place(k))).collect();
-    // Squares put light into points that are a whole number of steps apart: their weights are all that a point gets.
-    let all = |k: usize| plain.iter().skip(k % 4).step_by(4).sum::<f64>();
-    (0..2 * SPREAD).map(|k| (0.25 * plain[k] / all(k)) as f32).collect()
+/// Cells beside the window of a kernel whose light counts, of the three that [`lanczos`] reaches: the light at the border of a window is
+/// faint, and the first lobe holds nearly all of what is spread from there. Transforms have 96 places an axis with it in place of 108.
+const BESIDE_WINDOW: usize = 1;
+/// Points on both sides of the middle of a cell, half a pixel apart, that its light is spread over between it and its neighbours.
+fn spread_points(cell: usize) -> usize {
+    2 * cell * LOBES
+}
+
+/// Weights of the points about a cell, half a pixel apart; an even scene stays exactly even.
+fn spread(cell: usize) -> Vec<f32> {
+    let (points, step) = (spread_points(cell), 2 * cell);
+    let place = |k: usize| (k as f64 + 0.5 - points as f64) / step as f64;
+    let plain: Vec<f64> = (0..2 * points).map(|k| lanczos(place(k))).collect();
+    // Cells put light into points that are a whole number of steps apart: their weights are all that a point gets.
+    let all = |k: usize| step as f64 * plain.iter().skip(k % step).step_by(step).sum::<f64>();
+    (0..2 * points).map(|k| (plain[k] / all(k)) as f32).collect()
 }
 
 impl<'a> KernelSource<'a> {
@@ -63,9 +69,11 @@ impl<'a> KernelSource<'a> {
         let steps = bank.spec.nodes - 1;
         assert!(steps.is_multiple_of(detail.node_step), "every step ends at a node");
         let cell = detail.points.cell();
+        // Blocks are whole squares of the filter.
+        let square = cell.min(2);
         let counted = |channel: usize| {
-            (0..cell * cell)
-                .map(|i| [i / cell, i % cell])
+            (0..square * square)
+                .map(|i| [i / square, i % square])
                 .filter(|[y, x]| {
                     cell == 1
                         || sensor.filter == ColourFilter::None
@@ -90,7 +98,7 @@ impl<'a> KernelSource<'a> {
             },
             between: detail.between,
             node_step: detail.node_step,
-            phases: (0..bank.channel_um.len()).map(counted).collect(),
+            counted: (0..bank.channel_um.len()).map(counted).collect(),
         }
     }
 
@@ -102,22 +110,33 @@ impl<'a> KernelSource<'a> {
         }
     }
 
-    /// Pixels of a cell whose light is found for a channel, row and column.
+    /// Places in a cell of the values of a frame that are found for a channel, row and column.
     pub(crate) fn phases(&self, channel: usize) -> &[[usize; 2]] {
-        &self.phases[channel]
+        let counted = &self.counted[channel];
+        match self.points {
+            ScenePoints::OneABlock if counted.is_empty() => &[],
+            ScenePoints::OneABlock => &[[0; 2]],
+            _ => counted,
+        }
+    }
+
+    /// Pixels of a cell whose mean is a value, row and column.
+    fn mean_of(&self, channel: usize, phase: usize) -> &[[usize; 2]] {
+        match self.points {
+            ScenePoints::OneABlock => &self.counted[channel],
+            _ => &self.counted[channel][phase..=phase],
+        }
     }
 
     /// Cells on each side of its own that a kernel reaches.
     pub(crate) fn reach(&self) -> usize {
-        let spread = match self.points {
-            ScenePoints::OneASquare => SPREAD / 2,
-            _ => 0,
-        };
-        (self.spec.window / 2 + spread).div_ceil(self.points.cell())
+        let cell = self.points.cell();
+        let beside = if cell > 1 { BESIDE_WINDOW } else { 0 };
+        (self.spec.window / 2).div_ceil(cell) + beside
     }
 
-    /// The kernel of a node, for light at a point of a cell, on one pixel of each cell: `2 reach + 1` values an axis, the
-    /// middle one in the cell itself.
+    /// The kernel of a node, for light at a point of a cell, on one value of the frame in each cell: `2 reach + 1` values an
+    /// axis, the middle one in the cell itself.
     pub(crate) fn pixels(
         &self,
         element: usize,
@@ -125,25 +144,29 @@ impl<'a> KernelSource<'a> {
         channel: usize,
         bases: Range<usize>,
         point: usize,
-        phase: [usize; 2],
+        phase: usize,
     ) -> Vec<f32> {
         let side = 2 * self.reach() + 1;
-        let [down, across] = [0, 1].map(|axis| self.taps((point >> (1 - axis)) & 1, phase[axis]));
+        let pixels = self.mean_of(channel, phase);
         let (kept, node) = (2 * self.spec.window, node.map(|n| n * self.node_step));
         let mut out = vec![0.0f32; side * side];
         for basis in bases {
             let (kernel, level) = self.kernel(element, node, channel, basis);
             let kernel = kernel.turned();
-            // Sums along the rows that are asked for, each once.
-            let mut lines: Vec<Option<Vec<f32>>> = vec![None; kept];
-            for (m, to) in out.chunks_exact_mut(side).enumerate() {
-                for (i, weight) in down.weights_of(m, kept) {
-                    let line = lines[i].get_or_insert_with(|| {
-                        let row = &kernel[i * kept..][..kept];
-                        (0..side).map(|x| across.sum(x, row)).collect()
-                    });
-                    let weight = level * weight;
-                    to.iter_mut().zip(line.iter()).for_each(|(t, v)| *t += weight * v);
+            let level = level / pixels.len() as f32;
+            for pixel in pixels {
+                let [down, across] = [0, 1].map(|axis| self.taps((point >> (1 - axis)) & 1, pixel[axis]));
+                // Sums along the rows that are asked for, each once.
+                let mut lines: Vec<Option<Vec<f32>>> = vec![None; kept];
+                for (m, to) in out.chunks_exact_mut(side).enumerate() {
+                    for (i, weight) in down.weights_of(m, kept) {
+                        let line = lines[i].get_or_insert_with(|| {
+                            let row = &kernel[i * kept..][..kept];
+                            (0..side).map(|x| across.sum(x, row)).collect()
+                        });
+                        let weight = level * weight;
+                        to.iter_mut().zip(line.iter()).for_each(|(t, v)| *t += weight * v);
+                    }
                 }
             }
         }
@@ -185,11 +208,23 @@ impl<'a> KernelSource<'a> {
                 stride: 2,
                 weights: vec![0.5; 2],
             },
-            ScenePoints::OneASquare => Taps {
-                first: window - 4 * self.reach() as i64 + 2 * phase as i64 - SPREAD as i64 - 1,
-                stride: 4,
-                weights: spread(),
-            },
+            ScenePoints::OneASquare | ScenePoints::OneABlock => {
+                let cell = self.points.cell();
+                let before = 2 * cell * self.reach() + spread_points(cell) + cell;
+                let one = spread(cell);
+                // Squares of the filter that a value is the mean of, four values of the kernel apart.
+                let squares = self.points.value().div_ceil(2);
+                let mut weights = vec![0.0; one.len() + 4 * (squares - 1)];
+                for square in 0..squares {
+                    let to = weights[4 * square..].iter_mut().zip(&one);
+                    to.for_each(|(t, w)| *t += w / squares as f32);
+                }
+                Taps {
+                    first: window + 2 * phase as i64 + 1 - before as i64,
+                    stride: 2 * cell,
+                    weights,
+                }
+            }
         }
     }
 }
@@ -225,14 +260,14 @@ mod tests {
 
     #[test]
     fn an_even_scene_stays_even_and_waves_their_height() {
-        let weights = spread();
+        let weights = spread(2);
         for class in 0..4 {
             let sum: f32 = weights.iter().skip(class).step_by(4).sum();
             // Single precision.
             assert!((sum - 0.25).abs() < 1e-6, "{sum}");
         }
         let height = |steps: f64| {
-            let wave = |k: usize| (2.0 * PI * 0.25 * (k as f64 + 0.5 - SPREAD as f64) / steps).cos();
+            let wave = |k: usize| (2.0 * PI * 0.25 * (k as f64 + 0.5 - spread_points(2) as f64) / steps).cos();
             weights
                 .iter()
                 .enumerate()

@@ -28,6 +28,9 @@ pub(crate) struct Warp {
     size: [usize; 2],
 }
 
+/// Planes whose light is taken from the scene, or put back, in one pass over the cells.
+const COLOURS: usize = 3;
+
 /// Place in the scene's picture that a cell views.
 #[derive(Clone, Copy)]
 struct Look {
@@ -147,11 +150,12 @@ impl Warp {
         warp
     }
 
-    /// The pixels of the sensor that are one phase of its cells, and of `beyond` more cells on each side.
-    pub(crate) fn pixels(&self, cell: usize, phase: [usize; 2], beyond: usize) -> PixelGrid {
+    /// The values of the frame, `step` an axis of a cell, that are one phase of its cells, and of `beyond` more cells on each
+    /// side.
+    pub(crate) fn pixels(&self, step: usize, phase: [usize; 2], beyond: usize) -> PixelGrid {
         PixelGrid {
-            origin: [0, 1].map(|a| (self.origin[a] - beyond as i64) * cell as i64 + phase[a] as i64),
-            step: cell,
+            origin: [0, 1].map(|a| (self.origin[a] - beyond as i64) * step as i64 + phase[a] as i64),
+            step,
             shape: self.shape.map(|n| n + 2 * beyond),
         }
     }
@@ -159,35 +163,59 @@ impl Warp {
     /// Light of planes of the scene on each cell.
     pub(crate) fn sample(&self, planes: &[&Array2<f32>]) -> Vec<Vec<f32>> {
         let from: Vec<_> = planes.iter().map(|p| p.as_standard_layout()).collect();
-        let sample = |plane: &[f32]| {
-            let mut out = vec![0.0; self.flux.len()];
-            for Look { cell, pixel, share } in &self.looks {
-                let at = *pixel as usize;
-                let (above, below) = (&plane[at..at + 2], &plane[at + self.size[1]..][..2]);
+        let from: Vec<&[f32]> = from.iter().map(|p| p.as_slice().expect("rows are whole")).collect();
+        let mut out = vec![vec![0.0; self.flux.len()]; planes.len()];
+        for (from, to) in from.chunks(COLOURS).zip(out.chunks_mut(COLOURS)) {
+            if let ([a, b, c], [d, e, f]) = (from, &mut *to) {
+                self.sample_together([a, b, c], [d, e, f]);
+            } else {
+                from.iter().zip(to).for_each(|(p, to)| self.sample_together([p], [to]));
+            }
+        }
+        out
+    }
+
+    fn sample_together<const N: usize>(&self, planes: [&[f32]; N], to: [&mut Vec<f32>; N]) {
+        for Look { cell, pixel, share } in &self.looks {
+            let (at, flux) = (*pixel as usize, self.flux[*cell as usize]);
+            for n in 0..N {
+                let (above, below) = (&planes[n][at..at + 2], &planes[n][at + self.size[1]..][..2]);
                 let above = above[0] + share[1] * (above[1] - above[0]);
                 let below = below[0] + share[1] * (below[1] - below[0]);
-                out[*cell as usize] = self.flux[*cell as usize] * (above + share[0] * (below - above));
+                to[n][*cell as usize] = flux * (above + share[0] * (below - above));
             }
-            out
-        };
-        from.iter()
-            .map(|p| sample(p.as_slice().expect("rows are whole")))
-            .collect()
+        }
     }
 
     /// The adjoint of [`Warp::sample`]: adds to planes of the scene, whose rows are whole.
     pub(crate) fn scatter(&self, light: &[&[f32]], planes: &mut [Array2<f32>]) {
-        for (light, plane) in light.iter().zip(planes) {
-            let plane = plane.as_slice_mut().expect("rows are whole");
-            for Look { cell, pixel, share } in &self.looks {
-                let at = *pixel as usize;
-                let value = light[*cell as usize] * self.flux[*cell as usize];
+        let mut planes: Vec<&mut [f32]> = planes
+            .iter_mut()
+            .map(|p| p.as_slice_mut().expect("rows are whole"))
+            .collect();
+        for (light, to) in light.chunks(COLOURS).zip(planes.chunks_mut(COLOURS)) {
+            if let ([a, b, c], [d, e, f]) = (light, &mut *to) {
+                self.scatter_together([a, b, c], [d, e, f]);
+            } else {
+                light
+                    .iter()
+                    .zip(to)
+                    .for_each(|(l, to)| self.scatter_together([l], [to]));
+            }
+        }
+    }
+
+    fn scatter_together<const N: usize>(&self, light: [&[f32]; N], planes: [&mut [f32]; N]) {
+        for Look { cell, pixel, share } in &self.looks {
+            let (at, flux) = (*pixel as usize, self.flux[*cell as usize]);
+            for n in 0..N {
+                let value = light[n][*cell as usize] * flux;
                 let below = share[0] * value;
                 let above = value - below;
-                let to = &mut plane[at..at + 2];
+                let to = &mut planes[n][at..at + 2];
                 to[0] += above - share[1] * above;
                 to[1] += share[1] * above;
-                let to = &mut plane[at + self.size[1]..][..2];
+                let to = &mut planes[n][at + self.size[1]..][..2];
                 to[0] += below - share[1] * below;
                 to[1] += share[1] * below;
             }

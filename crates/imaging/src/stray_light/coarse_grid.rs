@@ -27,9 +27,10 @@ pub(crate) fn spread(view: &SceneView, cells: &[f64], plane: &mut Array2<f32>) {
     }
 }
 
-/// Spreads squares over the pixels of the sensor: straight lines between the middles of squares.
-pub(crate) fn lay(cells: &[f64], shape: [usize; 2], frame: &mut Array2<f32>) {
-    let [down, across] = sensor_hats(frame.dim().into(), shape);
+/// Spreads squares over the values of a frame, each the mean of so many pixels an axis: straight lines between the middles of
+/// squares.
+pub(crate) fn lay(cells: &[f64], shape: [usize; 2], value: usize, frame: &mut Array2<f32>) {
+    let [down, across] = sensor_hats(frame.dim().into(), shape, value);
     for (mut row, hat) in frame.rows_mut().into_iter().zip(&down) {
         let line = line_of(cells, hat, shape[1]);
         let values = row.iter_mut().zip(&across);
@@ -38,8 +39,8 @@ pub(crate) fn lay(cells: &[f64], shape: [usize; 2], frame: &mut Array2<f32>) {
 }
 
 /// The adjoint of [`lay`].
-pub(crate) fn lift(frame: &Array2<f32>, shape: [usize; 2]) -> Vec<f64> {
-    let [down, across] = sensor_hats(frame.dim().into(), shape);
+pub(crate) fn lift(frame: &Array2<f32>, shape: [usize; 2], value: usize) -> Vec<f64> {
+    let [down, across] = sensor_hats(frame.dim().into(), shape, value);
     let mut cells = vec![0.0; shape[0] * shape[1]];
     for (row, hat) in frame.rows().into_iter().zip(&down) {
         let light = row.iter().map(|v| PIXEL_SHARE * f64::from(*v));
@@ -74,8 +75,8 @@ fn scene_hats(view: &SceneView) -> [Vec<Hat>; 2] {
     [view.rows, view.columns].map(|n| hats(n, n as f64 / SCENE_CELLS as f64, SCENE_CELLS))
 }
 
-fn sensor_hats(frame: [usize; 2], shape: [usize; 2]) -> [Vec<Hat>; 2] {
-    [0, 1].map(|a| hats(frame[a], CELL_PIXELS as f64, shape[a]))
+fn sensor_hats(frame: [usize; 2], shape: [usize; 2], value: usize) -> [Vec<Hat>; 2] {
+    [0, 1].map(|a| hats(frame[a], CELL_PIXELS as f64 / value as f64, shape[a]))
 }
 
 /// Squares on both sides of each of `n` pixels, `pixels` wide, with their weights.
