@@ -257,8 +257,7 @@ mod tests {
         let found = nothing(PillarShape::Square);
         let stack = options.stack(&found).unwrap();
         assert_eq!(stack, design.cell_stack().unwrap());
-        let told = options.assumptions(&found, None);
-        let (_, pillars) = told.iter().find(|(what, _)| *what == "pillars").unwrap();
+        let pillars = options.pillars();
         assert!(pillars.contains("40 nm of alumina") && pillars.contains("25 nm") && pillars.contains("n = 1.33"));
     }
 }

@@ -75,16 +75,28 @@ impl PsfArgs {
         words
     }
 
-    /// Assumptions that no layout states, taken from the options or their defaults. Without light nothing is simulated.
+    /// Lattice as it was found and, where light is simulated, assumptions that no layout states, of the options or their defaults.
     pub(super) fn assumptions(&self, found: &Extraction, light: Option<&PsfLight>) -> Vec<(&'static str, String)> {
-        let mut all = vec![
-            (
-                "pitch, as found",
-                match Self::lattice_kind(found) {
-                    LatticeKind::Square => format!("{} nm", Self::pitch_nm(found)),
-                    kind @ LatticeKind::Hexagonal => format!("{} nm, of a {kind} lattice", Self::pitch_nm(found)),
-                },
-            ),
+        let mut all = vec![(
+            "pitch, as found",
+            match Self::lattice_kind(found) {
+                LatticeKind::Square => format!("{} nm", Self::pitch_nm(found)),
+                kind @ LatticeKind::Hexagonal => format!("{} nm, of a {kind} lattice", Self::pitch_nm(found)),
+            },
+        )];
+        if let Some(deg) = found.turned_deg {
+            let words = format!(
+                "at an angle of {} deg; places and directions are along rows and columns of its lattice",
+                sig(deg, 6)
+            );
+            all.push(("the layout is placed", words));
+        }
+        if found.shape.basis().is_some() {
+            all.push(("pillars, as found", found.shape.description()));
+        }
+        let Some(light) = light else { return all };
+        all.extend([
+            ("edge of a sensor pixel", format!("{} um", exact(self.pixel_um(light)))),
             (
                 "distance from pillar tops to sensor",
                 format!("{} um", sig(self.distance_um, 6)),
@@ -97,33 +109,22 @@ impl PsfArgs {
                     sig(self.angle_y_deg, 4)
                 ),
             ),
-        ];
-        if let Some(deg) = found.turned_deg {
-            let words = format!(
-                "at an angle of {} deg; places and directions are along rows and columns of its lattice",
-                sig(deg, 6)
-            );
-            all.insert(1, ("the layout is placed", words));
-        }
-        if let Some(light) = light {
-            let edge = ("edge of a sensor pixel", format!("{} um", exact(self.pixel_um(light))));
-            all.insert(2, edge);
-        }
+        ]);
         let published = self.model.is_none() && matches!(self.fidelity, FidelityArg::Published);
         let cell = match (&self.model, self.fidelity) {
             (Some(model), _) => format!("as made, by {}", model.display()),
             (None, FidelityArg::Published) => "published polynomials for pillars of the paper, no amplitude".into(),
             (None, FidelityArg::Fitted) => "polynomials fitted to the rigorous cell, no amplitude".into(),
             (None, FidelityArg::Neighbours) => {
-                let white = match light {
-                    Some(light) if light.white.is_some() => {
+                let white = match &light.white {
+                    Some(_) => {
                         let tables: Vec<String> = light.tabulated_um().iter().map(|um| exact(um * 1e3)).collect();
                         format!(
                             "; polychromatic light is interpolated between the wavelengths that have tables, {} nm",
                             tables.join(", ")
                         )
                     }
-                    _ => String::new(),
+                    None => String::new(),
                 };
                 format!("each pillar among its neighbours, fitted to supercells of the layout's own widths{white}")
             }
@@ -131,7 +132,6 @@ impl PsfArgs {
         };
         all.push(("cell", cell));
         if found.shape.basis().is_some() {
-            all.push(("pillars, as found", found.shape.description()));
             all.push(("polarisation", self.polarised(found.shape)));
         }
         if !published {

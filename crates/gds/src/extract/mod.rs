@@ -256,6 +256,13 @@ fn extract_from(
     let selection = plan.selection();
     let top = layout.roots(&selection)?[0];
     let turn = found.turn;
+    // Another layer may hold what was meant.
+    if matches!(plan.elements, Elements::Given(_)) && layout.shapes_on(plan.pillar_layer) == 0 {
+        return Err(failed(layout.path())(ExtractionError::NoElements {
+            layers: plan.pillar_layer.to_string(),
+            contents: Some(crate::inventory::contents::words(layout, &selection, progress)?),
+        }));
+    }
     let mut pillars = PillarCollector::new(layout.path(), plan, found, Scale::of(layout)?, most);
     visit_turned(
         layout,

@@ -1,8 +1,8 @@
 //! Tests of what is taken for a pillar, and of the places of elements.
 
 use metalith_core::Silent;
-use metalith_gds::Layout;
 use metalith_gds::extract::{ElementSite, Extraction, ExtractionPlan, Why, extract};
+use metalith_gds::{Error, ExtractionError, Layout};
 use metalith_pillars::{Lattice, LatticeKind, PillarMap, PillarShape, RotatedRectangles};
 use metalith_testing::gds::Gds;
 
@@ -415,4 +415,22 @@ fn a_layout_of_another_design_is_refused_early() {
     let refused = metalith_core::Error::from(read(2501).unwrap_err());
     let text = refused.to_string();
     assert!(text.contains("10000000 outside every element"), "{text}");
+}
+
+/// A file of another layer is named by what it holds, also where a design gives the elements.
+#[test]
+fn a_layout_without_shapes_on_the_layer_is_refused() {
+    let (site, _) = foreign_lens();
+    let mut gds = Gds::library();
+    gds.cell("TOP").square(2, 0, 0, 100).end_cell();
+    let plan = ExtractionPlan::given(PILLARS, vec![site]);
+    let refused = extract(&layout(gds.end()), &plan, &Silent);
+    let Err(Error::Extraction { cause, .. }) = refused else {
+        panic!("{refused:?}")
+    };
+    let expected = ExtractionError::NoElements {
+        layers: "1/0".into(),
+        contents: Some("2/0: 1 square".into()),
+    };
+    assert_eq!(cause, expected);
 }
