@@ -29,7 +29,6 @@ FULL = {
     "starts_of_the_optimiser_are_runs_with_their_seeds",
     "the_draws_depend_neither_on_the_cut_nor_on_the_order_nor_on_threads",
     "a_design_of_a_grid_is_the_design_of_its_own_file",
-    "designs_of_a_grid_are_each_judged_by_their_own_layout_and_tables",
     "shards_are_whole_are_of_one_plan_and_are_counted",
     "a_limit_on_no_figure_is_told",
     # Chips as fabricated.

@@ -128,7 +128,7 @@ fn a_design_of_a_grid_is_the_design_of_its_own_file() {
 
 /// A grid over the design beside what is drawn.
 #[test]
-#[ignore = "second tier: CPU time, run by .ci/run"]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn designs_of_a_grid_are_each_judged_by_their_own_layout_and_tables() {
     let folder = tempfile::tempdir().unwrap();
     let path = tolerance(folder.path(), 3);

@@ -47,6 +47,7 @@ struct Lenses {
 }
 
 #[test]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn a_spot_of_a_scene_is_what_a_bench_records_of_it() {
     let folder = tempfile::tempdir().unwrap();
     small_set(folder.path());

@@ -232,6 +232,7 @@ fn a_pair_is_found_where_neither_of_the_two_helps() {
 /// Pillars that are higher at the rim of every lens: much of it is a defocus, which one number does not hold for all colours and
 /// widths.
 #[test]
+#[ignore = "second tier: CPU time, in scripts/slow_tests.sh"]
 fn heights_that_differ_over_the_lens_are_found() {
     const HIGHER_NM: f64 = 20.0;
     let set = synthetic(&[("rim_height", &[HIGHER_NM])], 32);

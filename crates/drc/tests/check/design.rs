@@ -263,3 +263,19 @@ fn pillars_of_two_elements_are_compared() {
     assert_eq!(found(350, [320, 320], 350), [broken("gap.min"), broken("gap.aspect")]);
     assert_eq!(found(250, [300, 240], 0), [broken("gap.overlap")]);
 }
+
+/// Reading ends where more rectangles than are kept stand elsewhere than the elements of the design.
+#[test]
+fn the_layout_of_another_design_is_not_read_whole() {
+    let case = Case::new(&[]);
+    let (columns, rows, pitch, corner) = (4000, 2100, 500, 1_000_000);
+    let mut gds = Gds::library();
+    gds.cell("PILLAR").square(1, 0, 0, 100).end_cell();
+    let [right, top] = [columns, rows].map(|n: i16| corner + i32::from(n) * pitch);
+    gds.cell("TOP")
+        .array("PILLAR", columns, rows, [corner, corner, right, corner, corner, top]);
+    std::fs::write(&case.file, gds.end_cell().end()).unwrap();
+    let report = case.judge();
+    assert!(rule(&report, "pillar.lattice").status != Status::Run, "{report:?}");
+    assert_ne!(report.exit_code(), 0);
+}
