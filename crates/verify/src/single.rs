@@ -257,8 +257,9 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
         white,
     } = *report;
     let elements = distinct(found);
+    let is_simulated = !psfs.is_empty();
     let mut page = Page::new(
-        format!("PSFs of {file}"),
+        format!("{} of {file}", if is_simulated { "PSFs" } else { "Pillars" }),
         "a layout without a design, computed from the bytes of its file",
     );
     if let Some(left_out) = left_out {
@@ -322,8 +323,10 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
             .caption("Pillars as read, to scale.")
     });
     page.row(zooms);
-    page.section("PSFs");
-    page.row([images.caption("Whole window, four decades.")]);
+    if is_simulated {
+        page.section("PSFs");
+        page.row([images.caption("Whole window, four decades.")]);
+    }
     let name = |found: &SinglePsf| format!("{}, {} nm", found.element, sig(found.wavelength_um * 1e3, 4));
     let series = || {
         psfs.iter()
@@ -332,7 +335,9 @@ pub fn write_single_psf_report(report: &SinglePsfReport<'_>, folder: &Path) -> R
     for (name, series) in series() {
         page.row([through_focus::row(&name, series)]);
     }
-    page.table(table.caption(STREHL_AGAINST));
+    if is_simulated {
+        page.table(table.caption(STREHL_AGAINST));
+    }
     if series().next().is_some() {
         page.table(through_focus::table("Element, wavelength", series()));
     }
