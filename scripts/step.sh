@@ -1,3 +1,4 @@
+# shellcheck shell=bash
 # Sourced by .ci/run and by what it calls: the title of a step, and when it begins in the whole run.
 export STEPS_BEGIN=${STEPS_BEGIN:-$(date +%s)}
 step() {
