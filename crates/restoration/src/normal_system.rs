@@ -102,7 +102,7 @@ impl<'a> NormalSystem<'a> {
         }
     }
 
-    /// The same system for the coarse model of the frame, if it has one.
+    /// This system for the coarse model of the frame, if it has one.
     pub(crate) fn coarse(&self) -> Option<NormalSystem<'a>> {
         let (side, operator) = self.term.operator.coarse()?;
         let sums = |planes: &Planes| {
@@ -164,7 +164,7 @@ impl<'a> NormalSystem<'a> {
         self.solve_by(RESPONSE, x, right, terms, iterations, progress)
     }
 
-    /// The same with another share of the mean response in the preconditioner than [`RESPONSE`].
+    /// Variant of [`NormalSystem::solve`] with another share of the mean response in the preconditioner than [`RESPONSE`].
     ///
     /// # Errors
     /// If the user stopped it.

@@ -59,12 +59,13 @@ pub struct FrameOperator<'a> {
     smoothing: Smoothing,
     /// Pixels an axis that are one value of the frame.
     value: usize,
-    /// What the coarse operator is made of, if there is one, and the operator once it was asked for.
+    /// Parts of the coarse operator, if there is one.
     coarse: Option<CoarseParts<'a>>,
+    /// The coarse operator, once it was asked for.
     made: OnceLock<Box<FrameOperator<'a>>>,
 }
 
-/// What a [`FrameOperator`] is made of.
+/// Parts of a coarse [`FrameOperator`].
 struct CoarseParts<'a> {
     bank: &'a KernelBank,
     stray_light: &'a StrayLight,
