@@ -118,8 +118,8 @@ pub fn cell_of(
     light: PolarisedLight,
     wavelengths_nm: &[f64],
 ) -> Result<Box<dyn CellModel>> {
-    let shape = stack.shape;
-    if let Some(cell) = polarising_cell(&stack, focused(light, shape), cache_folder().as_deref()) {
+    let (shape, cache) = (stack.shape, cache_folder());
+    if let Some(cell) = polarising_cell(&stack, focused(light, shape), cache.as_deref()) {
         return Ok(cell);
     }
     let drawn = drawn(maps);
@@ -127,15 +127,15 @@ pub fn cell_of(
         Fidelity::Published => Box::new(PublishedCell::new(stack.pitch_nm as u32)),
         Fidelity::Neighbours => {
             let mapping = Mapping::of_widths(maps.iter().map(PillarMap::histogram))?;
-            Box::new(NeighbourCell::new(stack, vec![mapping], cache_folder()))
+            Box::new(NeighbourCell::new(stack, vec![mapping], cache))
         }
         Fidelity::Fitted => {
             let band = band_about(wavelengths_nm.iter().map(|nm| nm * 1e-3), stack.range_um());
             let range = (*drawn.first().unwrap_or(&100), *drawn.last().unwrap_or(&300));
-            Box::new(FittedCell::of_stack(&stack, band, range)?)
+            Box::new(FittedCell::of_stack(&stack, band, range, cache.as_deref())?)
         }
-        _ if shape == PillarShape::Mixed => Box::new(MixedCell::new(&stack, drawn)),
-        _ => Box::new(PointwiseCell::new(stack, drawn)),
+        _ if shape == PillarShape::Mixed => Box::new(MixedCell::new(&stack, drawn).cached_in(cache.as_deref())),
+        _ => Box::new(PointwiseCell::new(stack, drawn).cached_in(cache.as_deref())),
     })
 }
 

@@ -12,6 +12,7 @@ use metalith::text::printable_json;
 use metalith::{AtomicFile, Error, Layout, Result};
 
 use super::compensated::CompensatedFor;
+use super::course::Course;
 use super::output::is_standard_output;
 use super::paths::name_of;
 use super::reading::ReadingArgs;
@@ -120,6 +121,7 @@ pub(crate) fn run(args: &CheckArgs, terminal: &Terminal) -> Result<Outcome> {
     };
     terminal.stop_on_interrupt();
     let file = InputFile::of(&args.layout)?;
+    terminal.follow(Course::of_check(&file));
     let open = |path: &Path| Layout::open_with(path, ReadLimits::default(), terminal);
     let deck = match (named, &design) {
         (Some(deck), Some(design)) => Some(deck.for_pillars_of(design)),

@@ -8,6 +8,7 @@ use metalith::diff::{self, DiffPlan};
 use metalith::file::InputFiles;
 use metalith::gds::USUAL_LAYER;
 
+use super::course::Course;
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
 use super::{Outcome, Terminal, output, print_json, print_text};
@@ -44,6 +45,7 @@ pub(crate) fn run(args: &DiffArgs, terminal: &Terminal) -> Result<Outcome> {
     InputFiles::of([args.a.as_path(), &args.b]).check_outputs(&report)?;
     terminal.stop_on_interrupt();
     let files = [InputFile::of(&args.a)?, InputFile::of(&args.b)?];
+    terminal.follow(Course::of_comparison([&files[0], &files[1]]));
     let open = |path: &Path| args.reading.open(path, terminal);
     let (a, b) = (open(&files[0])?, open(&files[1])?);
     // Where no layer is the one of the pillars, all shapes are compared as outlines.

@@ -10,6 +10,7 @@ mod compare;
 mod compensated;
 mod completions;
 mod convert;
+mod course;
 mod dataset;
 mod denoise;
 mod diff;

@@ -86,10 +86,15 @@ pub(super) fn hint(error: &clap::Error) -> Option<String> {
         let number: f64 = number.trim().parse().ok().filter(|_| is_unit)?;
         Some(format!(": {value} is {}", number * factor))
     });
+    let separators = if value.contains(',') {
+        ": write a decimal point, and no separators of thousands"
+    } else {
+        ""
+    };
     Some(format!(
         "give a plain number of {}, such as 850 or 0.5{}",
         unit.name,
-        in_unit.unwrap_or_default()
+        in_unit.unwrap_or_else(|| separators.into())
     ))
 }
 
@@ -110,6 +115,7 @@ mod tests {
         told("new a.toml --diameter-um 20mm", "20mm is 20000");
         told("new a.toml --wavelength-nm 1.55um", "1.55um is 1550");
         told("verify a.toml b.gds --memory-mb 2GB", "2GB is 2000");
+        told("new a.toml --focal-length-um 8,5e2", "no separators of thousands");
         told("new a.toml --focal-length-um far", "such as 850 or 0.5");
         assert_eq!(hint_of("new a.toml --diameter-um 20000"), None);
         assert_eq!(hint_of("new a.toml --diameter-um -5"), None);

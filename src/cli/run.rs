@@ -6,6 +6,7 @@ use clap::Args;
 use metalith::layout::write_pillars_as;
 use metalith::{Error, PillarArray, Result};
 
+use super::course::Course;
 use super::layout::Target;
 use super::paths::paths;
 use super::verify::{Judging, REPORT_FILES};
@@ -35,6 +36,7 @@ pub(crate) fn run(args: &RunArgs, terminal: &Terminal) -> Result<Outcome> {
     let folder = &out.path;
     let simulation = args.judging.simulation(&design, folder)?;
     Judging::announce(&simulation, terminal);
+    terminal.follow(Course::of_verification(&design, true));
     terminal.stop_on_interrupt();
     let array = PillarArray::build(&design, terminal)?;
     args.judging.check_drawn(&design, &array)?;

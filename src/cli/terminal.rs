@@ -12,6 +12,7 @@ use metalith::report::counted;
 use metalith::text::printable;
 use metalith::{FolderLock, Progress, Warning};
 
+use super::course::{Course, CoursePlace, left};
 use super::output;
 
 /// Time when Ctrl-C was first pressed in commands that can stop between two steps.
@@ -24,6 +25,12 @@ const ONE_WISH: Duration = Duration::from_secs(1);
 /// within it none.
 const BETWEEN_LINES: Duration = Duration::from_secs(30);
 
+/// Time between two drawings of a bar.
+const BETWEEN_BARS: Duration = Duration::from_millis(100);
+
+/// Parts of a bar.
+const BAR_LENGTH: u64 = 1000;
+
 /// Warnings that are printed in full, two lines each.
 const MOST_WARNINGS: usize = 3;
 
@@ -32,21 +39,22 @@ pub struct Terminal {
     quiet: bool,
     strict: AtomicBool,
     bar: Mutex<Option<ProgressBar>>,
-    log: Mutex<Log>,
+    told: Mutex<Told>,
     /// Warnings that were printed: a layout may be opened more than once.
     warned: Mutex<BTreeSet<String>>,
 }
 
-/// Log of the progress of work.
-struct Log {
+/// Progress of work, and when it was told.
+struct Told {
+    course: Course,
     work: Option<Work>,
     /// The last word on the state of the work, and whether a line has held it.
     note: Option<(String, bool)>,
     /// Time when the last line was written.
-    told: Instant,
+    at: Instant,
 }
 
-/// Work of which a log is told.
+/// Work that is at hand.
 struct Work {
     what: String,
     steps: u64,
@@ -54,18 +62,20 @@ struct Work {
     begun: Instant,
 }
 
-impl Log {
+impl Told {
     fn new(now: Instant) -> Self {
         Self {
+            course: Course::default(),
             work: None,
             note: None,
-            told: now,
+            at: now,
         }
     }
 
     fn begin(&mut self, what: &str, steps: u64, now: Instant) {
         // Short pieces of work follow one another: what was said of the last one waits for the next line.
         self.note = self.note.take().filter(|(_, told)| !told);
+        self.course.begin(what, now);
         self.work = Some(Work {
             what: what.to_owned(),
             steps,
@@ -79,43 +89,59 @@ impl Log {
         self.note = None;
     }
 
-    /// The line to tell, if it is time for one.
-    fn advance(&mut self, steps: u64, now: Instant) -> Option<String> {
-        self.work.as_mut()?.done += steps;
-        self.line(now)
-    }
-
-    /// Line after a word on the state of the work; outside of any work, the word itself.
-    fn note(&mut self, text: &str, now: Instant) -> Option<String> {
-        if self.work.is_none() {
-            return Some(text.to_owned());
+    /// True if it is time to tell again, which is then taken for done.
+    fn is_due(&mut self, now: Instant, between: Duration) -> bool {
+        let is_due = now.duration_since(self.at) >= between;
+        if is_due {
+            self.at = now;
         }
-        self.note = Some((text.to_owned(), false));
-        self.line(now)
+        is_due
     }
 
-    fn line(&mut self, now: Instant) -> Option<String> {
+    /// Place of the work at hand.
+    fn place(&self, now: Instant) -> Option<(&Work, CoursePlace)> {
         let work = self.work.as_ref()?;
-        if now.duration_since(self.told) < BETWEEN_LINES {
-            return None;
-        }
-        self.told = now;
-        let share = (work.done as f64 / work.steps.max(1) as f64).min(1.0);
+        let share = work.done as f64 / work.steps.max(1) as f64;
+        Some((work, self.course.place(share, now.duration_since(work.begun))))
+    }
+
+    /// Line of a log on the work at hand.
+    fn line(&mut self, now: Instant) -> Option<String> {
+        let (work, place) = self.place(now)?;
+        let step = place
+            .step
+            .map_or_else(String::new, |[number, of]| format!(" ({number} of {of})"));
+        let of_all = if place.step.is_some() { " of all" } else { "" };
         let seconds = now.duration_since(work.begun).as_secs_f64();
-        let left = if share > 0.0 {
-            format!(", about {:.0} s left", seconds * (1.0 - share) / share)
-        } else {
-            String::new()
-        };
+        let left = place
+            .left_s
+            .map_or_else(String::new, |s| format!(", about {}", left(s)));
+        let head = format!(
+            "{}{step}: {:.0} %{of_all} after {seconds:.0} s{left}",
+            work.what,
+            place.share * 100.0
+        );
         let note = self.note.as_mut().map_or_else(String::new, |(text, told)| {
             *told = true;
             format!("; {text}")
         });
-        Some(format!(
-            "{}: {:.0} % after {seconds:.0} s{left}{note}",
-            work.what,
-            share * 100.0
-        ))
+        Some(head + &note)
+    }
+
+    /// Draw a bar of the work at hand.
+    fn draw(&self, bar: &ProgressBar, now: Instant) {
+        let Some((work, place)) = self.place(now) else { return };
+        let step = place
+            .step
+            .map_or_else(String::new, |[number, of]| format!("{number}/{of} "));
+        let left = place.left_s.map_or_else(String::new, left);
+        let note = self
+            .note
+            .as_ref()
+            .map_or_else(String::new, |(text, _)| format!("; {text}"));
+        bar.set_message(step + &printable(&work.what));
+        bar.set_prefix(printable(&format!("{left}{note}")).into_owned());
+        bar.set_position((place.share * BAR_LENGTH as f64) as u64);
     }
 }
 
@@ -131,7 +157,7 @@ impl Terminal {
             quiet,
             strict: AtomicBool::new(false),
             bar: Mutex::new(None),
-            log: Mutex::new(Log::new(Instant::now())),
+            told: Mutex::new(Told::new(Instant::now())),
             warned: Mutex::new(BTreeSet::new()),
         }
     }
@@ -178,8 +204,35 @@ impl Terminal {
         self.bar.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn log(&self) -> MutexGuard<'_, Log> {
-        self.log.lock().unwrap_or_else(PoisonError::into_inner)
+    fn told(&self) -> MutexGuard<'_, Told> {
+        self.told.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Tell progress as that of a course, which begins now.
+    pub(crate) fn follow(&self, course: Course) {
+        self.told().course = course;
+    }
+
+    /// Draw the bar, or write a line of a log, if it is time for that.
+    fn tell(&self, change: impl FnOnce(&mut Told)) {
+        let (now, bar) = (Instant::now(), self.bar());
+        let mut told = self.told();
+        change(&mut told);
+        if let Some(bar) = &*bar {
+            if told.is_due(now, BETWEEN_BARS) {
+                told.draw(bar, now);
+            }
+            return;
+        }
+        // Lines go past the bar, which takes its lock.
+        drop(bar);
+        let line = (told.work.is_some() && told.is_due(now, BETWEEN_LINES))
+            .then(|| told.line(now))
+            .flatten();
+        drop(told);
+        if let Some(line) = line {
+            self.say(&line);
+        }
     }
 
     fn clear_bar(&self) {
@@ -217,48 +270,44 @@ impl Terminal {
 
     /// Take the progress bar off the screen.
     pub fn clear(&self) {
-        self.log().end();
+        self.told().end();
         self.clear_bar();
     }
 }
 
 impl Progress for Terminal {
     fn begin(&self, what: &str, steps: u64) {
-        self.clear_bar();
         if self.quiet {
             return;
         }
+        let now = Instant::now();
+        self.told().begin(what, steps, now);
         if !std::io::stderr().is_terminal() {
-            self.log().begin(what, steps, Instant::now());
             return;
         }
-        let style = ProgressStyle::with_template("{msg:28} {wide_bar} {percent:>3} %  {eta:>4} left {prefix}")
-            .expect("the template is a constant");
-        let bar = ProgressBar::new(steps.max(1))
-            .with_style(style)
-            .with_message(printable(what).into_owned());
-        *self.bar() = Some(bar);
+        let mut bar = self.bar();
+        let bar = bar.get_or_insert_with(|| {
+            let style = ProgressStyle::with_template("{msg:30} {wide_bar} {percent:>3} %  {prefix}")
+                .expect("the template is a constant");
+            ProgressBar::new(BAR_LENGTH).with_style(style)
+        });
+        self.told().draw(bar, now);
     }
 
     fn advance(&self, steps: u64) {
-        if let Some(bar) = &*self.bar() {
-            bar.inc(steps);
-        }
-        let line = self.log().advance(steps, Instant::now());
-        if let Some(line) = line {
-            self.say(&line);
-        }
+        self.tell(|told| {
+            if let Some(work) = &mut told.work {
+                work.done += steps;
+            }
+        });
     }
 
     fn note(&self, text: &str) {
-        if let Some(bar) = &*self.bar() {
-            bar.set_prefix(printable(text).into_owned());
+        if self.told().work.is_none() {
+            self.say(text);
             return;
         }
-        let line = self.log().note(text, Instant::now());
-        if let Some(line) = line {
-            self.say(&line);
-        }
+        self.tell(|told| told.note = Some((text.to_owned(), false)));
     }
 
     fn warn(&self, text: &str) {
@@ -285,13 +334,17 @@ mod tests {
     fn a_log_gets_a_line_now_and_then() {
         let begun = Instant::now();
         let after = |seconds| begun + Duration::from_secs(seconds);
-        let mut log = Log::new(begun);
-        log.begin("solving", 200, begun);
-        assert_eq!(log.advance(10, after(29)), None);
-        let line = log.advance(40, after(30)).unwrap();
+        let mut told = Told::new(begun);
+        told.begin("solving", 200, begun);
+        assert!(!told.is_due(after(29), BETWEEN_LINES));
+        told.work.as_mut().unwrap().done = 50;
+        assert!(told.is_due(after(30), BETWEEN_LINES));
+        let line = told.line(after(30)).unwrap();
         assert_eq!(line, "solving: 25 % after 30 s, about 90 s left");
-        assert_eq!(log.advance(10, after(31)), None);
-        let line = log.advance(500, after(90)).unwrap();
+        assert!(!told.is_due(after(31), BETWEEN_LINES));
+        told.work.as_mut().unwrap().done = 500;
+        assert!(told.is_due(after(90), BETWEEN_LINES));
+        let line = told.line(after(90)).unwrap();
         assert_eq!(line, "solving: 100 % after 90 s, about 0 s left");
     }
 
@@ -300,22 +353,22 @@ mod tests {
     fn lines_of_a_log_hold_the_last_word() {
         let begun = Instant::now();
         let after = |seconds| begun + Duration::from_secs(seconds);
-        let mut log = Log::new(begun);
-        assert_eq!(log.note("alone", begun).as_deref(), Some("alone"));
-        log.begin("learning", 100, begun);
-        assert_eq!(log.note("loss 3", after(1)), None);
-        assert_eq!(log.note("loss 2", after(2)), None);
-        let line = log.advance(10, after(30)).unwrap();
-        assert_eq!(line, "learning: 10 % after 30 s, about 270 s left; loss 2");
-        let line = log.advance(40, after(60)).unwrap();
-        assert_eq!(line, "learning: 50 % after 60 s, about 60 s left; loss 2");
-        log.begin("restoring", 10, after(61));
-        assert_eq!(log.note("20 dB", after(62)), None);
-        log.begin("restoring", 10, after(85));
-        let line = log.advance(5, after(95)).unwrap();
+        let mut told = Told::new(begun);
+        let (learning, restoring) = (("learning", 100), ("restoring", 10));
+        told.begin(learning.0, learning.1, begun);
+        told.note = Some(("loss 2".into(), false));
+        told.work.as_mut().unwrap().done = 10;
+        let line = told.line(after(30)).unwrap();
+        assert_eq!(line, "learning: 10 % after 30 s, about 4 min left; loss 2");
+        told.begin(restoring.0, restoring.1, after(61));
+        told.note = Some(("20 dB".into(), false));
+        told.begin(restoring.0, restoring.1, after(85));
+        told.work.as_mut().unwrap().done = 5;
+        let line = told.line(after(95)).unwrap();
         assert_eq!(line, "restoring: 50 % after 10 s, about 10 s left; 20 dB");
-        log.begin("restoring", 10, after(120));
-        let line = log.advance(5, after(130)).unwrap();
+        told.begin(restoring.0, restoring.1, after(120));
+        told.work.as_mut().unwrap().done = 5;
+        let line = told.line(after(130)).unwrap();
         assert_eq!(line, "restoring: 50 % after 10 s, about 10 s left");
     }
 

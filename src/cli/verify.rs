@@ -17,6 +17,7 @@ use metalith::{
 
 use super::accuracy_args::AccuracyArgs;
 use super::compensated::{CompensatedFor, judged_as_made};
+use super::course::Course;
 use super::paths::{inputs_of, paths};
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
@@ -168,9 +169,9 @@ impl Judging {
         match simulation {
             Simulation::Whole => {}
             Simulation::InParts { parts, needed_mb, .. } => terminal.say(&format!(
-                "note: large elements: about {needed_mb:.0} MB of memory, each field in at most {parts} part{}, by the cell \
-                 that judges alone",
-                if *parts == 1 { "" } else { "s" }
+                "note: large elements take about {needed_mb:.0} MB of memory: each field is simulated in at most {}, and other cell \
+                 models are not compared with the one that judges",
+                counted(*parts, "part")
             )),
             Simulation::Not(why) => {
                 terminal.say(&format!(
@@ -351,6 +352,7 @@ pub(crate) fn run(args: &VerifyArgs, terminal: &Terminal) -> Result<Outcome> {
         args.judging.fidelity,
     )?;
     Judging::announce(&args.judging.simulation(&design, &layout)?, terminal);
+    terminal.follow(Course::of_verification(&design, false));
     terminal.stop_on_interrupt();
     let array = args.compensated.array(&mut design, terminal)?;
     let folder = args

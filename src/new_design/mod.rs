@@ -71,6 +71,15 @@ pub struct NewDesign {
     pub width_max_nm: Option<u16>,
 }
 
+/// Reason why a design is refused, with the remedy.
+struct Refusal {
+    id: &'static str,
+    what: String,
+    hint: String,
+}
+
+const OUT_OF_RANGE: &str = "new/out-of-range";
+
 /// The text of a new design, and a sentence on its mapping where its pillars were chosen.
 #[derive(Clone, Debug)]
 pub struct NewDesignText {
@@ -146,98 +155,107 @@ impl NewDesign {
         self.steering_deg.unwrap_or(usual)
     }
 
-    /// Refuse a wavelength that is one of micrometres, and limits of widths that no pillars are within.
+    /// Refuse what no lens has, all of it at once.
     ///
     /// # Errors
-    /// For each of these.
-    pub(crate) fn check_given(&self) -> Result<()> {
-        self.check_unit()?;
-        self.check_widths()
+    /// With each value that is out of range or in another unit, and limits of widths that no pillars are within.
+    pub(crate) fn check(&self) -> Result<()> {
+        let found = [
+            self.other_units(),
+            self.short_wavelength(),
+            self.out_of_range(),
+            self.narrow_pillars(),
+            self.exchanged_widths(),
+        ];
+        let found: Vec<Refusal> = found.into_iter().flatten().collect();
+        let Some(first) = found.first() else { return Ok(()) };
+        let all = |of: fn(&Refusal) -> &str| found.iter().map(of).collect::<Vec<_>>().join("; ");
+        Err(Error::refused(first.id, all(|one| &one.what), all(|one| &one.hint)))
     }
 
-    /// Refuse a wavelength that is one of micrometres, and a focal length or diameter that is one of millimetres beside the other.
-    fn check_unit(&self) -> Result<()> {
-        let given = self
-            .focal_length_um
-            .zip(self.diameter_um)
-            .filter(|(f, d)| *f > 0.0 && *d > 0.0);
-        let f_number = |(focal, diameter): (f64, f64)| focal / diameter;
-        let is_off = |ratio: f64| ratio > 0.0 && ratio.is_finite() && !F_NUMBERS.contains(&ratio);
-        if let Some((focal, diameter)) = given.filter(|given| is_off(f_number(*given))) {
-            let f_number = f_number((focal, diameter));
-            let (name, um) = if f_number < 1.0 {
-                ("a focal length", focal)
-            } else {
-                ("a diameter", diameter)
-            };
-            return Err(Error::refused(
-                "new/out-of-range",
-                format!("a lens of {diameter} um and f = {focal} um, f/{}", sig(f_number, 2)),
-                format!(
-                    "micrometres are meant: {name} of {um} mm is {}? f/{} to f/{} are designed",
-                    um * 1e3,
-                    F_NUMBERS.start(),
-                    F_NUMBERS.end()
-                ),
-            ));
-        }
-        match self.wavelength_nm {
-            Some(nm) if nm > 0.0 && nm < SHORTEST_NM => Err(Error::refused(
-                "new/out-of-range",
-                format!("a lens for {nm} nm"),
-                // Shorter than a picometre it is in metres, else in micrometres.
-                format!(
-                    "nanometres are meant: {}?",
-                    if nm < 1e-3 {
-                        (nm * 1e12).round() / 1e3
-                    } else {
-                        (nm * 1e6).round() / 1e3
-                    }
-                ),
-            )),
-            _ => Ok(()),
-        }
-    }
-
-    /// Refuse limits of widths that no pillars are within.
-    fn check_widths(&self) -> Result<()> {
-        let (least, most) = (self.width_min_nm, self.width_max_nm);
-        if let Some(nm) = [least, most].into_iter().flatten().find(|nm| *nm < NARROWEST_NM) {
-            return Err(Error::refused(
-                "new/out-of-range",
-                format!("pillars {nm} nm wide"),
-                format!("give widths of {NARROWEST_NM} nm or more"),
-            ));
-        }
-        match (least, most) {
-            (Some(least), Some(most)) if least >= most => Err(Error::refused(
-                "new/widths-exchanged",
-                format!("a narrowest pillar of {least} nm and a widest of {most} nm"),
-                "give a widest pillar that is wider than the narrowest",
-            )),
-            _ => Ok(()),
-        }
-    }
-
-    fn check(&self) -> Result<()> {
-        self.check_given()?;
-        let (nm, diameter_um, focal_length_um) = (self.wavelength_nm(), self.diameter_um(), self.focal_length_um());
-        let (diameters, focal_lengths) = (DIAMETER.range, FOCAL_LENGTH.range);
-        let is_lens = diameters.contains(&diameter_um) && focal_lengths.contains(&focal_length_um);
-        if nm.is_finite() && nm > 0.0 && is_lens && self.steering_deg().abs() < 90.0 {
-            return Ok(());
-        }
-        Err(Error::refused(
-            "new/out-of-range",
-            format!("a lens of {diameter_um} um, f = {focal_length_um} um, for {nm} nm"),
-            format!(
-                "give a diameter from {} to {} um, a focal length from {} to {} um, a positive wavelength and steering of less than 90 degrees",
-                diameters.start(),
-                diameters.end(),
-                focal_lengths.start(),
-                focal_lengths.end()
+    /// A focal length or diameter that is one of millimetres beside the other.
+    fn other_units(&self) -> Option<Refusal> {
+        let (focal, diameter) = self.focal_length_um.zip(self.diameter_um)?;
+        let f_number = focal / diameter;
+        let is_off = focal > 0.0 && diameter > 0.0 && f_number.is_finite() && !F_NUMBERS.contains(&f_number);
+        let (name, um) = if f_number < 1.0 {
+            ("a focal length", focal)
+        } else {
+            ("a diameter", diameter)
+        };
+        is_off.then(|| Refusal {
+            id: OUT_OF_RANGE,
+            what: format!("a lens of {diameter} um and f = {focal} um, f/{}", sig(f_number, 2)),
+            hint: format!(
+                "micrometres are meant: {name} of {um} mm is {}? f/{} to f/{} are designed",
+                um * 1e3,
+                F_NUMBERS.start(),
+                F_NUMBERS.end()
             ),
-        ))
+        })
+    }
+
+    /// A wavelength that is one of micrometres, or of metres.
+    fn short_wavelength(&self) -> Option<Refusal> {
+        let nm = self.wavelength_nm.filter(|nm| *nm > 0.0 && *nm < SHORTEST_NM)?;
+        // Shorter than a picometre it is in metres.
+        let meant = if nm < 1e-3 { nm * 1e9 } else { nm * 1e3 };
+        Some(Refusal {
+            id: OUT_OF_RANGE,
+            what: format!("a lens for {nm} nm"),
+            hint: format!("nanometres are meant: {}?", (meant * 1e3).round() / 1e3),
+        })
+    }
+
+    /// Lengths and angles that no lens has.
+    fn out_of_range(&self) -> Option<Refusal> {
+        let within = |name: &str, um: f64, range: &std::ops::RangeInclusive<f64>| {
+            let hint = format!("give {name} from {} to {} um", range.start(), range.end());
+            (!range.contains(&um)).then(|| (format!("{name} of {um} um"), hint))
+        };
+        let (nm, steering_deg) = (self.wavelength_nm(), self.steering_deg());
+        let found = [
+            within("a diameter", self.diameter_um(), &DIAMETER.range),
+            // One that follows from the diameter is not named beside it.
+            self.focal_length_um
+                .and_then(|um| within("a focal length", um, &FOCAL_LENGTH.range)),
+            (!(nm.is_finite() && nm > 0.0))
+                .then(|| (format!("a wavelength of {nm} nm"), "give a positive wavelength".into())),
+            (!(steering_deg.abs() < 90.0)).then(|| {
+                let hint = "give steering of less than 90 degrees".into();
+                (format!("steering by {steering_deg} degrees"), hint)
+            }),
+        ];
+        let (what, hint): (Vec<String>, Vec<String>) = found.into_iter().flatten().unzip();
+        (!what.is_empty()).then(|| Refusal {
+            id: OUT_OF_RANGE,
+            what: what.join(", "),
+            hint: hint.join(", "),
+        })
+    }
+
+    /// Pillars that no design file takes.
+    fn narrow_pillars(&self) -> Option<Refusal> {
+        let given = [self.width_min_nm, self.width_max_nm].into_iter().flatten();
+        let nm = given.min().filter(|nm| *nm < NARROWEST_NM)?;
+        Some(Refusal {
+            id: OUT_OF_RANGE,
+            what: format!("pillars {nm} nm wide"),
+            hint: format!("give widths of {NARROWEST_NM} nm or more"),
+        })
+    }
+
+    /// Limits of widths that no pillars are within.
+    fn exchanged_widths(&self) -> Option<Refusal> {
+        let (least, most) = self
+            .width_min_nm
+            .zip(self.width_max_nm)
+            .filter(|(least, most)| least >= most)?;
+        Some(Refusal {
+            id: "new/widths-exchanged",
+            what: format!("a narrowest pillar of {least} nm and a widest of {most} nm"),
+            hint: "give a widest pillar that is wider than the narrowest".into(),
+        })
     }
 
     /// Pillars chosen for a lens of a diameter and focal length (um) in an array of so many elements with a steering

@@ -1,6 +1,6 @@
 //! The three fidelities of the cell, compared on a set: nuisances fitted, nothing else.
 
-use metalith_cell::{FittedCell, PublishedCell};
+use metalith_cell::{FittedCell, PublishedCell, cache_folder};
 use metalith_core::{Progress, Result};
 use ndarray::Array2;
 use serde::Serialize;
@@ -62,6 +62,7 @@ fn polynomials(
         &set.stack.cell,
         (ends.0 * 1e-3, ends.1 * 1e-3),
         (low as u16, high as u16),
+        cache_folder().as_deref(),
     )?;
     let fitted = CellSource::Model(Box::new(fitted));
     let mut rungs = Vec::new();

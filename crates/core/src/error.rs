@@ -153,11 +153,9 @@ fn io_hint(source: &std::io::Error) -> &'static str {
             "\n  help: check the path; a relative path in a file counts from the folder of that file, another one from the folder where you are"
         }
         std::io::ErrorKind::PermissionDenied | std::io::ErrorKind::ReadOnlyFilesystem => {
-            "\n  help: choose a folder that you may write to with --out"
+            "\n  help: choose a folder that you may write to"
         }
-        std::io::ErrorKind::StorageFull => {
-            "\n  help: free space or choose another folder with --out; nothing was replaced"
-        }
+        std::io::ErrorKind::StorageFull => "\n  help: free space or choose another folder; nothing was replaced",
         _ => "",
     }
 }

@@ -41,7 +41,7 @@ pub use layer::LayerNumber;
 pub use memo::Memo;
 pub use plane::part;
 pub use processor::vector_instructions;
-pub use progress::{Named, Progress, Quiet, Silent};
+pub use progress::{Named, Progress, Quiet, Silent, Steps};
 pub use warning::Warning;
 pub use wedge::{Wedge, numerical_aperture, turned_sine};
 pub use zernike::Zernike;

@@ -1,5 +1,7 @@
 //! Progress of long work: it reports how far it is, and learns that it should stop.
 
+use std::sync::{Mutex, PoisonError};
+
 use crate::{Error, Result};
 
 /// Observer of a long piece of work. The library prints nothing itself.
@@ -82,6 +84,89 @@ impl Progress for Named<'_> {
     }
 }
 
+/// Steps of one piece of work. Work that begins within a step moves the piece by a part of that step, and does not take its place.
+pub struct Steps<'p> {
+    progress: &'p dyn Progress,
+    present: Mutex<PresentStep>,
+}
+
+/// Parts of a step that are told.
+const PARTS: u64 = 1000;
+
+/// Share of what is left of a step that work within it takes: more may follow.
+const WITHIN: f64 = 0.9;
+
+/// Present step of [`Steps`], in parts of it.
+#[derive(Default)]
+struct PresentStep {
+    told: u64,
+    /// Parts before the work within it, and the steps of that work: done, and all.
+    before: u64,
+    done: u64,
+    steps: u64,
+}
+
+impl<'p> Steps<'p> {
+    /// A piece of work of `steps` equal steps begins.
+    pub fn begin(progress: &'p dyn Progress, what: &str, steps: u64) -> Self {
+        progress.begin(what, steps.saturating_mul(PARTS));
+        Self {
+            progress,
+            present: Mutex::default(),
+        }
+    }
+
+    /// The present step is done.
+    pub fn done(&self) {
+        self.tell(|present| {
+            let rest = PARTS - present.told;
+            *present = PresentStep::default();
+            rest
+        });
+    }
+
+    fn tell(&self, change: impl FnOnce(&mut PresentStep) -> u64) {
+        let parts = change(&mut self.present.lock().unwrap_or_else(PoisonError::into_inner));
+        self.progress.advance(parts);
+    }
+}
+
+impl Progress for Steps<'_> {
+    fn begin(&self, _what: &str, steps: u64) {
+        self.tell(|present| {
+            (present.before, present.done, present.steps) = (present.told, 0, steps.max(1));
+            0
+        });
+    }
+
+    fn advance(&self, steps: u64) {
+        self.tell(|present| {
+            present.done += steps;
+            let share = (present.done as f64 / present.steps.max(1) as f64).min(1.0);
+            let told = present.before + (WITHIN * share * (PARTS - present.before) as f64) as u64;
+            let more = told.saturating_sub(present.told);
+            present.told += more;
+            more
+        });
+    }
+
+    fn note(&self, text: &str) {
+        self.progress.note(text);
+    }
+
+    fn warn(&self, text: &str) {
+        self.progress.warn(text);
+    }
+
+    fn strict(&self) -> bool {
+        self.progress.strict()
+    }
+
+    fn stopped(&self) -> bool {
+        self.progress.stopped()
+    }
+}
+
 /// Hears that the user wants to stop, and shows nothing: the work is a step of something else.
 pub struct Quiet<'a>(pub &'a dyn Progress);
 
@@ -96,5 +181,45 @@ impl Progress for Quiet<'_> {
 
     fn stopped(&self) -> bool {
         self.0.stopped()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Begun pieces of work, and steps that were told.
+    #[derive(Default)]
+    struct Heard(Mutex<(Vec<(String, u64)>, u64)>);
+
+    impl Progress for Heard {
+        fn begin(&self, what: &str, steps: u64) {
+            self.0.lock().unwrap().0.push((what.to_owned(), steps));
+        }
+
+        fn advance(&self, steps: u64) {
+            self.0.lock().unwrap().1 += steps;
+        }
+    }
+
+    #[test]
+    fn work_within_a_step_moves_the_whole() {
+        let heard = Heard::default();
+        let told = || heard.0.lock().unwrap().1;
+        let steps = Steps::begin(&heard, "simulating", 2);
+        steps.begin("cells", 10);
+        steps.advance(5);
+        assert_eq!(told(), 450);
+        // More than was expected.
+        steps.advance(15);
+        assert_eq!(told(), 900);
+        steps.begin("more cells", 1);
+        steps.advance(1);
+        assert_eq!(told(), 990);
+        steps.done();
+        assert_eq!(told(), 1000);
+        steps.done();
+        assert_eq!(told(), 2000);
+        assert_eq!(heard.0.lock().unwrap().0, [("simulating".to_owned(), 2000)]);
     }
 }

@@ -182,6 +182,7 @@ pub fn cell_models(design: &Design, wanted: &[Fidelity]) -> Result<Vec<Box<dyn C
                         &stack,
                         design.band_of(&stack),
                         design.cell.width_range_nm,
+                        cache_folder().as_deref(),
                     )?))
                 }
             }

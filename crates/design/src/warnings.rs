@@ -3,6 +3,7 @@
 use metalith_cell::Fidelity;
 use metalith_core::{Result, Warning, numerical_aperture};
 use metalith_pillars::{DatabaseUnit, PillarShape, Pitch, Steepness};
+use metalith_rcwa::Material;
 
 use crate::phase::{ElementPhase, LensPhase, RadialPhase, TermForm};
 use crate::{AskedLight, CellIncidence, CellSpec, Design, LatticeOrders, LensSpec};
@@ -16,6 +17,10 @@ const FEWEST_ROWS: usize = 16;
 /// Angle at which light arrives (degrees) beyond which cells that are solved at normal incidence are too good: at 15 degrees, Strehl
 /// ratios of arrays of TiO2 pillars fall from 0.96 to 0.90.
 pub const MOST_NORMAL_DEG: f64 = 10.0;
+
+/// Share of the light that one pass through the film of the pillars absorbs, beyond which a mask of another material is better: shipped
+/// designs lose less.
+const MOST_ABSORBED: f64 = 0.1;
 
 /// Height over width of the narrowest pillar that is written: beyond it no lens has been published.
 const MOST_SLENDER: f64 = 20.0;
@@ -59,6 +64,7 @@ impl Design {
         found.extend(self.steep_phase());
         found.extend(self.steered_at_normal_incidence());
         found.extend(self.slender_pillars());
+        found.extend(self.absorbing_pillars()?);
         found.extend(self.other_pixels());
         found.extend(self.beyond_focus());
         found.extend(lattice_warning(
@@ -197,6 +203,38 @@ impl Design {
                 "use `incidence = \"oblique\"` in [verify], or --oblique",
             )
         })
+    }
+
+    /// Pillars and layers under them that absorb, at the wavelength where they absorb most.
+    fn absorbing_pillars(&self) -> Result<Option<Warning>> {
+        let stack = self.cell_stack()?;
+        let film = (&stack.film, stack.height_nm);
+        let layers = stack.under.iter().map(|layer| (&layer.material, layer.height_nm));
+        let layers: Vec<(&Material, f64)> = [film].into_iter().chain(layers).collect();
+        let mut most = (0.0, 0.0);
+        for um in self.verify.wavelengths_um.iter().chain([&self.mapping.wavelength_um]) {
+            let mut depth = 0.0;
+            for (material, height_nm) in &layers {
+                depth += 4.0 * std::f64::consts::PI * material.index(*um)?.im * height_nm * 1e-3 / um;
+            }
+            let lost = 1.0 - f64::exp(-depth);
+            most = if lost > most.0 { (lost, *um) } else { most };
+        }
+        let (lost, um) = most;
+        Ok((lost > MOST_ABSORBED).then(|| {
+            Warning::new(
+                "cell/absorbing-pillars",
+                format!(
+                    "the film of the pillars absorbs: one pass through {} nm of {} loses {:.0} % of the light at {:.0} nm where the film is \
+                     not removed",
+                    stack.height_nm,
+                    stack.film,
+                    lost * 100.0,
+                    um * 1e3
+                ),
+                "use a material that is clear at the wavelengths of [verify] and [mapping], or a lower film",
+            )
+        }))
     }
 
     /// Pillars that are many times as high as wide.
@@ -531,6 +569,28 @@ mod tests {
         let design = Design::parse(&metalith_testing::design("mini_3x3"), &text).unwrap();
         let found = design.warnings().unwrap();
         assert!(ids(&found).contains(&"cell/slender-pillars"), "{found:?}");
+    }
+
+    /// One pass through 500 nm with k = 0.02 at 532 nm loses 1 - exp(-4 pi 0.02 500 / 532) = 21 %.
+    #[test]
+    fn pillars_that_absorb_are_named_with_the_loss() {
+        let folder = tempfile::tempdir().unwrap();
+        let film = |k: f64| {
+            let path = folder.path().join("film.csv");
+            std::fs::write(&path, format!("wavelength_um,n,k\n0.3,2.4,{k}\n0.9,2.4,{k}\n")).unwrap();
+            let to = format!("pillar_material = '{}'", path.display());
+            let text = metalith_testing::accepting(&metalith_testing::changed(
+                "tio2_532",
+                &[("pillar_material = \"tio2_siefke_2016\"", &to)],
+            ));
+            let design = Design::parse_without_library(&metalith_testing::design("tio2_532"), &text).unwrap();
+            let nm = design.cell.pillar_height_nm;
+            (nm, design.absorbing_pillars().unwrap())
+        };
+        let (nm, found) = film(0.02);
+        let lost = 1.0 - f64::exp(-4.0 * std::f64::consts::PI * 0.02 * nm / 532.0);
+        assert!(found.unwrap().what.contains(&format!("loses {:.0} %", lost * 100.0)));
+        assert_eq!(film(0.001).1, None);
     }
 
     #[test]

@@ -16,10 +16,10 @@ use super::work::{Allowance, Stop, Work};
 use foldhash::fast::RandomState;
 use metalith_core::text::printable_bytes;
 use metalith_core::{Error, Progress, Result};
-use metalith_gds::extract::{Discovered, Filler, Scale, Why};
+use metalith_gds::extract::{Discovered, Filler, ReasonCounts, Scale, Why};
 use metalith_gds::{
-    BoxMemo, DrawnPillar, ExtractionError, LayerNumber, Layout, LayoutCell, Outline, OutlineMemo, PillarFinder, Point,
-    Rect, Selection, Shape, Text, Transform, Visitor, circle_of, rectangle_of, simplified,
+    BoxMemo, DrawnPillar, LayerNumber, Layout, LayoutCell, Outline, OutlineMemo, PillarFinder, Point, Rect, Selection,
+    Shape, Text, Transform, Visitor, circle_of, rectangle_of, simplified,
 };
 use metalith_pillars::{OutlineForm, PillarShape};
 
@@ -75,6 +75,7 @@ pub(super) fn gather<'a>(
         rects: 0,
         given: input.design.is_some(),
         off_lattice: Vec::new(),
+        elsewhere: ReasonCounts::default(),
         odd_on_lattice: 0,
         pillar_shapes: 0,
         texts: Vec::new(),
@@ -184,6 +185,8 @@ struct Gather<'r, 'p> {
     given: bool,
     vertices: u64,
     off_lattice: Vec<Rect>,
+    /// Pillars that have no site, by the reason.
+    elsewhere: ReasonCounts,
     odd_on_lattice: u64,
     pillar_shapes: u64,
     texts: Vec<PlacedText>,
@@ -324,8 +327,7 @@ impl Gather<'_, '_> {
         }
         match self.filler.put_drawn(pillar, placement, |_| true) {
             Ok(_) => return,
-            Err(Why::OffLattice) => self.off_lattice.push(pillar.around),
-            Err(_) => {}
+            Err(why) => self.stands_elsewhere(why, pillar.around),
         }
         self.keep(self.pillars, &placed());
     }
@@ -338,8 +340,7 @@ impl Gather<'_, '_> {
         }
         match standing {
             Ok(_) => self.odd_on_lattice += 1,
-            Err(Why::OffLattice) => self.off_lattice.push(*r),
-            Err(_) => {}
+            Err(why) => self.stands_elsewhere(why, *r),
         }
         if self.shape.is_square() {
             self.keep_rect(self.pillars, r);
@@ -348,20 +349,24 @@ impl Gather<'_, '_> {
         }
     }
 
+    fn stands_elsewhere(&mut self, why: Why, around: Rect) {
+        self.elsewhere.add(why);
+        if why == Why::OffLattice {
+            self.off_lattice.push(around);
+        }
+    }
+
     /// Check that pillars stand where the design has elements, before all of a large layout is read.
     ///
     /// # Errors
-    /// If more rectangles than are kept stand elsewhere, and no pillar does there.
+    /// As [`Filler::check_of_design`].
     #[inline]
     fn check_of_design(&self) -> Result<()> {
-        if !self.given || self.rects <= self.allowance.rects || self.filler.pillars() > 0 {
+        if !self.given {
             return Ok(());
         }
-        let cause = ExtractionError::NotOfDesign {
-            shapes: self.rects,
-            reasons: "all stand elsewhere".into(),
-        };
-        Err(Error::refused(cause.id(), cause.to_string(), cause.remedy()))
+        let checked = self.filler.check_of_design(self.elsewhere);
+        checked.map_err(|cause| Error::refused(cause.id(), cause.to_string(), cause.remedy()))
     }
 
     fn keep_rect(&mut self, layer: LayerNumber, r: &Rect) {
@@ -513,7 +518,7 @@ impl Gather<'_, '_> {
                 self.keep(shape.layer, &placed());
             }
         }
-        Ok(())
+        self.check_of_design()
     }
 }
 

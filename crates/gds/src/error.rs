@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use metalith_core::text::quoted;
+use metalith_core::text::{count, quoted};
 
 use metalith_oasis::OasisFault;
 
+use super::extract::ReasonCounts;
 use super::record;
 
 /// Result of reading a layout.
@@ -263,9 +264,11 @@ pub enum ExtractionError {
     },
     /// Shapes of elements that a design gives, before the first pillar on their lattices.
     #[error(
-        "none of the first {shapes} shapes on the pillar layer is a pillar on the lattices of the design: {reasons}"
+        "none of the first {} shapes on the pillar layer is a pillar on the lattices of the design: {}",
+        count(reasons.total()),
+        reasons.words()
     )]
-    NotOfDesign { shapes: u64, reasons: String },
+    NotOfDesign { reasons: ReasonCounts },
     #[error("a lattice of pitch {pitch_nm} nm about ({}, {}) nm", centre_nm[0], centre_nm[1])]
     Lattice { pitch_nm: f64, centre_nm: [f64; 2] },
 }

@@ -1,7 +1,7 @@
 //! The chip before its sensor: elements as read from a layout, in light.
 
 use metalith_cell::{Fidelity, Illumination, PolarisedLight};
-use metalith_core::{Progress, Result};
+use metalith_core::{Progress, Result, Steps};
 use metalith_design::array::Symmetry;
 use metalith_design::phase::OpenAreas;
 use metalith_design::{CellIncidence, Design, Element};
@@ -131,7 +131,8 @@ impl<'a> ChipInLight<'a> {
         let wavelengths_um: Vec<f64> = sampling.wavelengths_nm.iter().map(|nm| nm * 1e-3).collect();
         let (incidence, lattice) = (incidence(design), design.cell.lattice);
         let directions = DirectionalCells::<()>::count(incidence);
-        progress.begin(
+        let steps = Steps::begin(
+            progress,
             "solving the cells",
             (chosen.len() * wavelengths_um.len() * directions) as u64,
         );
@@ -150,7 +151,7 @@ impl<'a> ChipInLight<'a> {
             });
             let solve = |light: &Illumination<'_>| {
                 DirectionalCells::solve(incidence, lattice, light, |light| {
-                    optics.respond_over(&wavelengths_um, light, progress)
+                    optics.respond_over(&wavelengths_um, light, &steps)
                 })
                 .map(|_| ())
             };

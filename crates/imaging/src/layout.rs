@@ -3,7 +3,7 @@
 use metalith_core::{Error, Progress, Result};
 use metalith_design::array::PillarArray;
 use metalith_design::{Design, Element};
-use metalith_gds::extract::{Extraction, UnrecognisedShapes, Why};
+use metalith_gds::extract::Extraction;
 use metalith_pillars::PillarCheck;
 use metalith_report::count;
 use serde::{Deserialize, Serialize};
@@ -47,7 +47,7 @@ pub(crate) fn check_elements(design: &Design, extraction: &Extraction) -> Result
     let foreign = &extraction.oddities;
     let where_first = foreign.listed.first().map_or_else(String::new, |oddity| {
         let [x, y] = oddity.centre_nm.map(|nm| nm * 1e-3);
-        format!(" ({}), the first about ({x:.1}, {y:.1}) um", why(foreign))
+        format!(" ({}), the first about ({x:.1}, {y:.1}) um", foreign.by_why.words())
     });
     Err(Error::refused(
         "layout/element-not-found",
@@ -63,13 +63,6 @@ pub(crate) fn check_elements(design: &Design, extraction: &Extraction) -> Result
     ))
 }
 
-/// Reason why shapes are no pillars of a design, in words; `None` where there are none.
-fn why(foreign: &UnrecognisedShapes) -> String {
-    let each = Why::ALL.into_iter().zip(foreign.by_why).filter(|(_, n)| *n > 0);
-    let words: Vec<String> = each.map(|(why, n)| format!("{} {}", count(n), why.words())).collect();
-    words.join(", ")
-}
-
 impl PillarCount {
     /// Count of the pillars read from a layout.
     ///
@@ -80,7 +73,7 @@ impl PillarCount {
         let mut found = Self {
             pillars: extraction.pillars,
             foreign: extraction.oddities.total(),
-            why: why(&extraction.oddities),
+            why: extraction.oddities.by_why.words(),
             ..Self::default()
         };
         for (placed, element) in array.placed.iter().zip(&extraction.elements) {

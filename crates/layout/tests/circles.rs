@@ -32,11 +32,7 @@ fn holds(path: &Path, design: &Design, array: &PillarArray) {
     let layout = Layout::open(path).unwrap();
     let squares = extract(&layout, &plan(design, PillarShape::Square), &Silent).unwrap();
     assert_eq!(squares.pillars, 0, "{name}");
-    assert_eq!(
-        squares.oddities.by_why[Why::OtherShape as usize],
-        array.pillars(),
-        "{name}"
-    );
+    assert_eq!(squares.oddities.by_why[Why::OtherShape], array.pillars(), "{name}");
 }
 
 #[test]

@@ -166,7 +166,7 @@ fn pillars_of_another_lattice_are_told() {
     let path = folder.path().join("square.gds");
     write_pillars_as(&square, &array, Hierarchy::Flat, LayoutFormat::Gds, &path, &Silent).unwrap();
     let read = extract(&Layout::open(&path).unwrap(), &extraction_plan(&design), &Silent).unwrap();
-    let off = read.oddities.by_why[Why::OffLattice as usize] + read.oddities.by_why[Why::OutsideElements as usize];
+    let off = read.oddities.by_why[Why::OffLattice] + read.oddities.by_why[Why::OutsideElements];
     assert_eq!(read.pillars + off, array.pillars());
     assert!(off > array.pillars() * 9 / 10, "{off}");
 }

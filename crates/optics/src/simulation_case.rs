@@ -14,7 +14,7 @@ use super::{
     ModelStatement, NeighbourSites, Perturbation, Placement,
 };
 use metalith_cell::{CellModel, CellResponse, Fidelity, Illumination};
-use metalith_core::{Progress, Result};
+use metalith_core::{Progress, Result, Steps};
 use metalith_pillars::{LatticeKind, PillarMap, PillarRows};
 
 /// Simulation case of the pillars of a layout.
@@ -139,19 +139,14 @@ impl<'a> CaseOptics<'a> {
     ///
     /// # Errors
     /// As [`CaseOptics::response`].
-    pub fn respond_over(
-        &self,
-        wavelengths_um: &[f64],
-        light: &Illumination<'_>,
-        progress: &dyn Progress,
-    ) -> Result<()> {
+    pub fn respond_over(&self, wavelengths_um: &[f64], light: &Illumination<'_>, progress: &Steps<'_>) -> Result<()> {
         let at = |um: &f64| {
             let light = Illumination {
                 wavelength_um: *um,
                 ..*light
             };
             self.response(&light, progress)?;
-            progress.advance(1);
+            progress.done();
             Ok(())
         };
         match &self.source {

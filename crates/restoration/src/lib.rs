@@ -53,6 +53,7 @@ pub use frame_fit::FrameFit;
 pub use frame_model::{FrameModel, Planes};
 pub use learned::LearnedDenoiser;
 pub use method::RestorationMethod;
+pub use normal_system::sums_of_blocks;
 pub use quality::{psnr_db, ssim, ssim_colour};
 pub use recorded::Recorded;
 pub use scene_statistics::{

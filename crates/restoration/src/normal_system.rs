@@ -229,8 +229,8 @@ fn dot(a: &[Array2<f32>], b: &[Array2<f32>]) -> f64 {
     of_planes.iter().sum()
 }
 
-/// Sums over blocks of `side` values an axis.
-fn sums_of_blocks(values: &Array2<f32>, side: usize) -> Array2<f32> {
+/// Sums over blocks of `side` values an axis; those at the end have fewer values, if `side` does not divide the plane.
+pub fn sums_of_blocks(values: &Array2<f32>, side: usize) -> Array2<f32> {
     let mut sums = Array2::zeros([values.nrows(), values.ncols()].map(|n| n.div_ceil(side)));
     for ((y, x), value) in values.indexed_iter() {
         sums[[y / side, x / side]] += value;

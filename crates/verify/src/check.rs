@@ -255,41 +255,37 @@ fn not_simulated(limits: &LimitSpec, why: &str) -> Vec<Check> {
 /// The limits that a sample of zones tells, each held by the end of an interval of three standard errors that is worse: what is
 /// left open by the sample does not hold.
 fn of_sample(limits: &LimitSpec, sample: &SampledZones) -> Vec<Check> {
-    let rms = |of: &dyn Fn(&SampledElement) -> f64| worst(sample.elements.iter().map(|e| (e.element.label(), of(e))));
-    let strehl = |of: &dyn Fn(&SampledSpot) -> f64| {
-        let spots = sample
-            .elements
-            .iter()
-            .flat_map(|e| e.spots.iter().map(|s| (s.label(&e.element), s)));
-        worst(spots.map(|(place, spot)| (place, -of(spot))))
-    };
     let words =
-        |name: &str, place: String| format!("{name}, by a sample of zones, three standard errors allowed for, {place}");
-    let mapping = rms(&|e| e.mapping_rms_rad.most()).map(|(place, most)| {
-        let what = words("rms phase error of the mapping [rad]", format!("element {place}"));
-        at_most(
-            what,
-            "mapping_phase_rms_max_rad",
-            most,
-            limits.mapping_phase_rms_max_rad,
-        )
-    });
-    let rounding = rms(&|e| e.rounding_rms_rad.most()).map(|(place, most)| {
-        let what = words("rms phase error of rounding [rad]", format!("element {place}"));
-        at_most(
-            what,
-            "rounding_phase_rms_max_rad",
-            most,
-            limits.rounding_phase_rms_max_rad,
-        )
-    });
-    let ratio = strehl(&|s| s.strehl_ratio.map_or(0.0, |ratio| ratio.least())).map(|(place, least)| {
-        let what = words("Strehl ratio of the layout over the Strehl ratio of the target", place);
-        at_least(what, "strehl_ratio_min", -least, limits.strehl_ratio_min)
-    });
-    let peak = strehl(&|s| s.strehl.least()).map(|(place, least)| {
-        let what = words("Strehl ratio of the layout", place);
-        at_least(what, "strehl_min", -least, limits.strehl_min)
+        |name: &str, place: &str| format!("{name}, by a sample of zones, three standard errors allowed for, {place}");
+    let phase = |name: &str, key: &'static str, limit: f64, of: &dyn Fn(&SampledElement) -> f64| {
+        let all = sample.elements.iter().map(|e| (e.element.label(), of(e)));
+        worst(all).map(|(place, most)| at_most(words(name, &format!("element {place}")), key, most, limit))
+    };
+    let strehl = |name: &str, key: &'static str, limit: f64, of: &dyn Fn(&SampledSpot) -> f64| {
+        let elements = sample.elements.iter();
+        let all = elements.flat_map(|e| e.spots.iter().map(|spot| (spot.label(&e.element), -of(spot))));
+        worst(all).map(|(place, least)| at_least(words(name, &place), key, -least, limit))
+    };
+    let mapping = phase(
+        "rms phase error of the mapping [rad]",
+        "mapping_phase_rms_max_rad",
+        limits.mapping_phase_rms_max_rad,
+        &|e| e.mapping_rms_rad.most(),
+    );
+    let rounding = phase(
+        "rms phase error of rounding [rad]",
+        "rounding_phase_rms_max_rad",
+        limits.rounding_phase_rms_max_rad,
+        &|e| e.rounding_rms_rad.most(),
+    );
+    let ratio = strehl(
+        "Strehl ratio of the layout over the Strehl ratio of the target",
+        "strehl_ratio_min",
+        limits.strehl_ratio_min,
+        &|spot| spot.strehl_ratio.map_or(0.0, |ratio| ratio.least()),
+    );
+    let peak = strehl("Strehl ratio of the layout", "strehl_min", limits.strehl_min, &|spot| {
+        spot.strehl.least()
     });
     let all = [mapping, rounding, ratio, peak].into_iter().flatten();
     all.map(|check| Check { sampled: true, ..check }).collect()

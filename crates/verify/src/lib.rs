@@ -37,7 +37,7 @@ use serde::Serialize;
 
 use metalith_cell::{Fidelity, SolvedMapping};
 use metalith_core::text::printable;
-use metalith_core::{Progress, Result, Warning};
+use metalith_core::{Progress, Result, Steps, Warning};
 use metalith_design::array::{PillarArray, PillarRule, PlacedElement, Symmetry};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{AskedLight, Design, Element, FieldAngle, LatticeOrders};
@@ -361,7 +361,7 @@ fn judge(
     };
     let series = central.map_or(0, |_| design.verify.wavelengths_um.len());
     let psfs: usize = chosen.iter().map(|one| simulator.psfs(one) + in_white).sum();
-    progress.begin("simulating elements", (psfs + series) as u64);
+    let steps = Steps::begin(progress, "simulating elements", (psfs + series) as u64);
     let mut simulated = Vec::new();
     for (k, one) in chosen.into_iter().enumerate() {
         let element = one.element;
@@ -372,17 +372,17 @@ fn judge(
         simulated.push(DistinctElement {
             element,
             copies: one.copies,
-            phase: phase_errors(design, &read, &|ix, iy| phase.wrapped(ix, iy), &rule, progress)?,
+            phase: phase_errors(design, &read, &|ix, iy| phase.wrapped(ix, iy), &rule, &steps)?,
             steepness: Steepness::of(&array.lattice, |ix, iy| phase.turns(ix, iy)),
-            orders: simulator.orders(&element, &phase, &rule, &read, progress)?,
-            spots: simulator.simulate(&one, &phase, &read, progress)?,
+            orders: simulator.orders(&element, &phase, &rule, &read, &steps)?,
+            spots: simulator.simulate(&one, &phase, &read, &steps)?,
             through_focus: if central == Some(k) {
-                simulator.through_focus(&element, &phase, &read, progress)?
+                simulator.through_focus(&element, &phase, &read, &steps)?
             } else {
                 Vec::new()
             },
             white: match &white {
-                Some(white) => white.simulate(&element, &phase, &read, progress)?,
+                Some(white) => white.simulate(&element, &phase, &read, &steps)?,
                 None => Vec::new(),
             },
             histogram: widths.histogram(),

@@ -69,9 +69,10 @@ impl Simulation {
         let least_mb = needed(spectra / MOST_PARTS as f64);
         if least_mb > memory_mb {
             return Ok(Self::Not(format!(
-                "in parts that takes about {least_mb:.0} MB of memory on {}, and --memory-mb allows \
-                 {memory_mb:.0}",
-                counted(rayon::current_num_threads(), "thread")
+                "in parts that takes about {least_mb:.0} MB of memory on {}, {:.0} MB of it for the pillars alone, and \
+                 --memory-mb allows {memory_mb:.0}",
+                counted(rayon::current_num_threads(), "thread"),
+                1e-6 * held
             )));
         }
         let part = (1e6 * (memory_mb - needed(0.0)) / threads).min(spectra);

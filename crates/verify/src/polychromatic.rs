@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::optics::{ReadElement, incidence};
 use super::polychromatic_channels::{Channels, Point, WhiteChannel, per_light};
 use metalith_cell::{Illumination, Incidence};
-use metalith_core::{Progress, Result};
+use metalith_core::{Progress, Result, Steps};
 use metalith_design::phase::ElementPhase;
 use metalith_design::{Design, Element};
 use metalith_optics::{CaseOptics, IncoherentFields, SimulationCase};
@@ -132,14 +132,12 @@ impl<'a> WhiteSimulator<'a> {
     /// # Errors
     /// If a cell has no answer, or the user stopped it.
     pub(crate) fn solve(&self, judge: &CaseOptics<'_>, elements: &[Element], progress: &dyn Progress) -> Result<()> {
-        if incidence(self.design) == Incidence::Oblique {
-            let all = elements.len() * self.colours.len();
-            progress.begin("solving cells for oblique polychromatic light", all as u64);
-        }
+        let all = elements.len() * self.colours.len();
+        let steps = Steps::begin(progress, "solving cells for polychromatic light", all as u64);
         for (um, _) in &self.colours {
             for element in elements {
-                self.in_light(element, *um, |light| judge.response(light, progress))?;
-                progress.advance(1);
+                self.in_light(element, *um, |light| judge.response(light, &steps))?;
+                steps.done();
             }
         }
         Ok(())
@@ -182,7 +180,7 @@ impl<'a> WhiteSimulator<'a> {
         element: &Element,
         phase: &ElementPhase<'_>,
         read: &ReadElement<'_>,
-        progress: &dyn Progress,
+        progress: &Steps<'_>,
     ) -> Result<Vec<WhiteChannel>> {
         let fields =
             |(um, _): &(f64, f64)| self.in_light(element, *um, |light| read.cases[0].in_light(light, progress));
@@ -195,7 +193,7 @@ impl<'a> WhiteSimulator<'a> {
             .map_init(Scratch::default, |scratch, ((um, full), fields)| {
                 progress.check_stopped()?;
                 let sample = self.sample(element, (*um, full * full * area_um2), &fields, scratch);
-                progress.advance(1);
+                progress.done();
                 sample
             })
             .collect::<Result<Vec<_>>>()?;

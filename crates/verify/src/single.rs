@@ -17,7 +17,7 @@ use super::single_stack::write_stacks;
 use super::single_white::SingleWhite;
 use super::{model_page, polychromatic_page, through_focus};
 use metalith_cell::{Fidelity, Illumination, PolarisedLight};
-use metalith_core::{AtomicFile, Error, Progress, Result};
+use metalith_core::{AtomicFile, Error, Progress, Result, Steps};
 use metalith_gds::extract::LeftOut;
 use metalith_gds::extract::{ElementSite, Extraction};
 use metalith_optics::{CaseOptics, ElementOptics, ModelStatement, Placement, SimulationCase};
@@ -93,7 +93,8 @@ pub fn single_psfs(
     }
     light.check_held(&elements, &light.wavelengths_um, 1)?;
     let apertures: Vec<PillarMap> = elements.iter().map(|(_, widths)| whole_aperture(widths)).collect();
-    progress.begin(
+    let steps = Steps::begin(
+        progress,
         "simulating elements",
         (elements.len() * light.wavelengths_um.len()) as u64,
     );
@@ -103,7 +104,7 @@ pub fn single_psfs(
     let mut all = Vec::new();
     for &wavelength_um in &light.wavelengths_um {
         let lit = light.illumination(wavelength_um);
-        let fields = read.iter().map(|element| element.in_light(&lit, progress));
+        let fields = read.iter().map(|element| element.in_light(&lit, &steps));
         let fields = fields.collect::<Result<Vec<_>>>()?;
         let full = case.full_transmission(wavelength_um)?;
         let focus = [light.at_um[0], light.at_um[1], light.distance_um];
@@ -124,7 +125,7 @@ pub fn single_psfs(
                     Ok(through_focus::shown(series))
                 };
                 let through_focus = light.through_focus.as_ref().map(through).transpose()?;
-                progress.advance(1);
+                steps.done();
                 Ok(SinglePsf {
                     through_focus,
                     element: site.name.clone(),

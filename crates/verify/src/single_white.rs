@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::polychromatic::{CameraStatement, step_nm};
 use super::polychromatic_channels::{Channels, Point, WhiteChannel, per_light};
 use super::single::{Lighting, OPEN, distinct, kind_of, largest_number, whole_aperture};
-use metalith_core::{Progress, Result, Wedge};
+use metalith_core::{Progress, Result, Steps, Wedge};
 use metalith_gds::extract::Extraction;
 use metalith_optics::{IncoherentFields, SimulationCase};
 use metalith_sensor::{Camera, Sampling, WavelengthSteps};
@@ -55,7 +55,8 @@ pub fn single_white(
     let lp_mm = statement.frequencies().drawn();
     let elements = distinct(found);
     light.check_held(&elements, &[shortest_um], sampling.wavelengths_nm.len())?;
-    progress.begin(
+    let steps = Steps::begin(
+        progress,
         "simulating polychromatic light",
         (elements.len() * sampling.wavelengths_nm.len()) as u64,
     );
@@ -72,7 +73,7 @@ pub fn single_white(
         let fields = |nm: &f64| {
             Ok((
                 nm * 1e-3,
-                element.in_light(&light.illumination(nm * 1e-3).in_band(), progress)?,
+                element.in_light(&light.illumination(nm * 1e-3).in_band(), &steps)?,
             ))
         };
         let fields = sampling.wavelengths_nm.iter().map(fields).collect::<Result<Vec<_>>>()?;
@@ -86,7 +87,7 @@ pub fn single_white(
             let focus = [landing[0], landing[1], light.distance_um];
             let full = case.full_transmission(*um)?;
             let matched = IdealPsf::of(&Pillars::new(&aperture, &OPEN)?, focus, *um, full);
-            progress.advance(1);
+            steps.done();
             Ok(per_light(landing, psf, matched.power_um2))
         };
         let samples = fields.par_iter().map_init(Scratch::default, sample);

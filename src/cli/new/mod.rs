@@ -150,7 +150,7 @@ pub(crate) fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
         ));
     }
     let asked = args.asked();
-    asked.check_given()?;
+    asked.check()?;
     let name = args.design.file_stem().unwrap_or_default().to_string_lossy();
     if let Some(shipped) = &args.like {
         let like = Like {

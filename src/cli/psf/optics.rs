@@ -199,9 +199,9 @@ impl PsfArgs {
 
     /// Cell that solves it for the pillars as drawn.
     pub(super) fn cell(&self, found: &Extraction, light: &PsfLight) -> Result<Box<dyn CellModel>> {
-        let stack = self.stack(found)?;
+        let (stack, cache) = (self.stack(found)?, cache_folder());
         let focused = self.focused(found.shape);
-        if let Some(cell) = polarising_cell(&stack, focused, cache_folder().as_deref()) {
+        if let Some(cell) = polarising_cell(&stack, focused, cache.as_deref()) {
             return Ok(cell);
         }
         if matches!(self.fidelity, FidelityArg::Published) {
@@ -209,7 +209,7 @@ impl PsfArgs {
         }
         if matches!(self.fidelity, FidelityArg::Neighbours) {
             let mapping = Mapping::of_widths(found.elements.iter().map(|e| e.widths.histogram()))?;
-            let cell = NeighbourCell::new(stack, vec![mapping], cache_folder());
+            let cell = NeighbourCell::new(stack, vec![mapping], cache);
             return Ok(Box::new(cell.tabulated_at(&light.tabulated_um())));
         }
         let mut widths = found
@@ -220,7 +220,7 @@ impl PsfArgs {
         widths.sort_unstable();
         widths.dedup();
         if found.shape == PillarShape::Mixed {
-            return Ok(Box::new(MixedCell::new(&stack, widths)));
+            return Ok(Box::new(MixedCell::new(&stack, widths).cached_in(cache.as_deref())));
         }
         if matches!(self.fidelity, FidelityArg::Fitted) {
             let band_um = light.band_um(stack.range_um());
@@ -228,9 +228,14 @@ impl PsfArgs {
                 *widths.iter().find(|w| **w > 0).unwrap_or(&100),
                 *widths.last().unwrap_or(&300),
             );
-            return Ok(Box::new(FittedCell::of_stack(&stack, band_um, range)?));
+            return Ok(Box::new(FittedCell::of_stack(
+                &stack,
+                band_um,
+                range,
+                cache.as_deref(),
+            )?));
         }
-        Ok(Box::new(PointwiseCell::new(stack, widths)))
+        Ok(Box::new(PointwiseCell::new(stack, widths).cached_in(cache.as_deref())))
     }
 
     /// The wedge of the elements, by the options.

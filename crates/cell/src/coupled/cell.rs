@@ -30,7 +30,7 @@ impl NeighbourCell {
     pub fn new(stack: CellStack, mappings: Vec<Mapping>, cache: Option<PathBuf>) -> Self {
         let widths_nm = mappings.iter().flat_map(|m| m.samples_nm().iter().copied());
         Self {
-            equal: PointwiseCell::new(stack.clone(), widths_nm),
+            equal: PointwiseCell::new(stack.clone(), widths_nm).cached_in(cache.as_deref()),
             stack,
             mappings,
             cache,

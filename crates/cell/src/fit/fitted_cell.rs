@@ -1,5 +1,7 @@
 //! A cell whose phase is a fitted polynomial.
 
+use std::path::Path;
+
 use num_complex::Complex64;
 
 use super::fit_forward;
@@ -28,13 +30,20 @@ impl FittedCell {
         Self { pitch_nm, forward }
     }
 
-    /// Fit the rigorous cell over a band (um) and a range of widths (nm), at enough of both for the trend.
+    /// Fit the rigorous cell over a band (um) and a range of widths (nm), at enough of both for the trend. What is solved for it is
+    /// kept in the folder `cache`.
     ///
     /// # Errors
     /// As [`CellStack::transmission`] and [`fit_forward`].
-    pub fn of_stack(stack: &CellStack, band_um: (f64, f64), widths_nm: (u16, u16)) -> Result<Self> {
+    pub fn of_stack(
+        stack: &CellStack,
+        band_um: (f64, f64),
+        widths_nm: (u16, u16),
+        cache: Option<&Path>,
+    ) -> Result<Self> {
         let widths: Vec<u16> = (widths_nm.0..=widths_nm.1).step_by(FIT_WIDTH_STEP_NM).collect();
         let cell = PointwiseCell::with_orders(stack.clone(), widths.iter().copied(), Orders::new(FIT_ORDERS)?);
+        let cell = cell.cached_in(cache);
         let steps = ((band_um.1 - band_um.0) / FIT_BAND_STEP_UM).ceil().max(1.0) as usize;
         let curves = (0..=steps)
             .map(|i| {

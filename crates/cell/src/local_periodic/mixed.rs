@@ -1,5 +1,7 @@
 //! Local periodic approximation of squares and circles in one lens.
 
+use std::path::Path;
+
 use metalith_core::{Progress, Result};
 use metalith_pillars::{PillarId, PillarShape, SquaresAndCircles};
 use num_complex::Complex64;
@@ -34,6 +36,16 @@ impl MixedCell {
             squares: of(PillarShape::Square, squares),
             circles: of(PillarShape::Circle, circles),
             widest_nm,
+        }
+    }
+
+    /// This cell, whose answers along the normal are cached in a folder from one run to the next.
+    #[must_use]
+    pub fn cached_in(self, folder: Option<&Path>) -> Self {
+        Self {
+            squares: self.squares.cached_in(folder),
+            circles: self.circles.cached_in(folder),
+            ..self
         }
     }
 }

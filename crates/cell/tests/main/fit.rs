@@ -181,7 +181,7 @@ fn mappings_and_fits_that_cannot_be_are_refused() {
 #[test]
 fn the_fitted_cell_follows_the_trend_of_the_rigorous_one() {
     let cell = Solved::paper();
-    let fitted = FittedCell::of_stack(&cell.0, (0.50, 0.60), (100, 300)).unwrap();
+    let fitted = FittedCell::of_stack(&cell.0, (0.50, 0.60), (100, 300), None).unwrap();
     let curve = PhaseCurve::new(&cell, 0.545, &even_widths()).unwrap();
     let (each, _) = forward_errors(fitted.forward(), std::slice::from_ref(&curve), PITCH_NM);
     let (published, _) = forward_errors(&ForwardPolynomial::published(), &[curve], PITCH_NM);

@@ -124,7 +124,7 @@ fn busy(target: &Path) -> Error {
     Error::refused(
         "file/busy",
         format!("another process is writing {}", target.display()),
-        "wait for it, or write elsewhere with --out",
+        "wait for it, or write to another place",
     )
 }
 
@@ -245,7 +245,7 @@ mod tests {
         let words = refused(&part, io::ErrorKind::PermissionDenied.into()).to_string();
         insta::assert_snapshot!(words.replace(&*folder.path().to_string_lossy(), "FOLDER"), @"
             cannot write into the folder FOLDER: permission denied
-              help: choose a folder that you may write to with --out
+              help: choose a folder that you may write to
             ");
         // Another fault is one of the file, and so is one that is there and may not be written.
         assert_eq!(place(io::ErrorKind::InvalidInput), part);

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use metalith_pillars::Pitch;
-use metalith_report::{counted, exact};
+use metalith_report::{count, counted, exact};
 use serde::Serialize;
 
 use metalith_core::text::printable;
@@ -225,21 +225,21 @@ pub fn text(diff: &LayoutDiff) -> String {
             e.name,
             e.centre_nm[0] as f64 * 1e-3,
             e.centre_nm[1] as f64 * 1e-3,
-            e.added,
-            e.removed,
-            e.widened,
-            e.narrowed,
+            count(e.added),
+            count(e.removed),
+            count(e.widened),
+            count(e.narrowed),
             if e.rotated > 0 {
-                format!(", {} rotated", e.rotated)
+                format!(", {} rotated", count(e.rotated))
             } else {
                 String::new()
             },
             if e.moved > 0 {
-                format!(", {} moved or resized", e.moved)
+                format!(", {} moved or resized", count(e.moved))
             } else {
                 String::new()
             },
-            e.pillars[0],
+            count(e.pillars[0]),
             e.largest_change_nm,
             e.rms_change_nm,
             if e.largest_move_nm > 0.0 {
@@ -255,9 +255,9 @@ pub fn text(diff: &LayoutDiff) -> String {
             "layer {}: {} only in a, {} only in b{}{}",
             l.layer,
             counted(l.only_in_a as usize, "outline"),
-            l.only_in_b,
+            count(l.only_in_b),
             if l.moved > 0 {
-                format!(", {} moved or resized", l.moved)
+                format!(", {} moved or resized", count(l.moved))
             } else {
                 String::new()
             },
@@ -274,9 +274,9 @@ pub fn text(diff: &LayoutDiff) -> String {
             );
         }
     }
-    for (which, count) in [("a", diff.texts_apart[0]), ("b", diff.texts_apart[1])] {
-        if count > SHOWN as u64 {
-            let _ = writeln!(out, "and {} more texts only in {which}", count - SHOWN as u64);
+    for (which, apart) in [("a", diff.texts_apart[0]), ("b", diff.texts_apart[1])] {
+        if apart > SHOWN as u64 {
+            let _ = writeln!(out, "and {} more texts only in {which}", count(apart - SHOWN as u64));
         }
     }
     if diff.missing.in_both > 0 {
@@ -287,7 +287,7 @@ pub fn text(diff: &LayoutDiff) -> String {
         );
     }
     let missing = [&diff.missing.only_in_a, &diff.missing.only_in_b];
-    for ((which, list), count) in ["a", "b"].into_iter().zip(missing).zip(diff.missing.apart) {
+    for ((which, list), apart) in ["a", "b"].into_iter().zip(missing).zip(diff.missing.apart) {
         for m in list.iter().take(SHOWN) {
             let [x, y] = m.at_nm.map(|v| v * 1e-3);
             let _ = writeln!(
@@ -296,8 +296,12 @@ pub fn text(diff: &LayoutDiff) -> String {
                 m.cell
             );
         }
-        if count > SHOWN as u64 {
-            let _ = writeln!(out, "and {} more such references only in {which}", count - SHOWN as u64);
+        if apart > SHOWN as u64 {
+            let _ = writeln!(
+                out,
+                "and {} more such references only in {which}",
+                count(apart - SHOWN as u64)
+            );
         }
     }
     for c in diff.listed.iter().take(SHOWN) {
@@ -314,7 +318,7 @@ pub fn text(diff: &LayoutDiff) -> String {
         );
     }
     if diff.changes > SHOWN as u64 {
-        let _ = writeln!(out, "  and {} more", diff.changes - SHOWN as u64);
+        let _ = writeln!(out, "  and {} more", count(diff.changes - SHOWN as u64));
     }
     if !diff.tree.same {
         let t = &diff.tree;

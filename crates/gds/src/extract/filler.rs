@@ -10,10 +10,14 @@ use super::places::PlaceFit;
 use super::plan::ExtractedElement;
 use super::sites::{Scale, SitePlace, Sites};
 use super::stored_pillars::StoredPillars;
-use super::unrecognised_shapes::Why;
+use super::unrecognised_shapes::{ReasonCounts, Why};
 use super::{MOST_BYTES, WHOLE_SITE_BYTES, too_many_sites};
 use crate::{DrawnPillar, ExtractionError, Rect, Transform};
 use metalith_pillars::{EighthMap, ElementSite, PillarRows};
+
+/// Shapes before the first pillar of a design, after which the layout is taken for another design's: lenses of 1 mm have fewer, and
+/// seconds pass.
+const MOST_BEFORE_A_PILLAR: u64 = 10_000_000;
 
 /// Puts pillars on the sites of elements.
 ///
@@ -122,6 +126,19 @@ impl Filler {
     /// Pillars that were put, over all elements.
     pub fn pillars(&self) -> u64 {
         self.pillars
+    }
+
+    /// Check that pillars stand where a design has elements, before all of a large layout is read; `elsewhere` counts the shapes
+    /// that are none.
+    ///
+    /// # Errors
+    /// [`ExtractionError::NotOfDesign`] after [`MOST_BEFORE_A_PILLAR`] shapes without a pillar.
+    #[inline]
+    pub fn check_of_design(&self, elsewhere: ReasonCounts) -> Result<(), ExtractionError> {
+        if self.pillars > 0 || elsewhere.total() < MOST_BEFORE_A_PILLAR {
+            return Ok(());
+        }
+        Err(ExtractionError::NotOfDesign { reasons: elsewhere })
     }
 
     /// The elements with their pillars.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::plan::Extraction;
-use super::unrecognised_shapes::{UnrecognisedShape, Why};
+use super::unrecognised_shapes::UnrecognisedShape;
 use metalith_core::LayerNumber;
 use metalith_core::text::count;
 
@@ -29,10 +29,6 @@ impl LeftOut {
         let left_out = found.oddities.in_elements;
         let first = found.oddities.first?;
         let all = found.pillars + left_out;
-        let reasons = Why::ALL.into_iter().zip(found.oddities.by_why).filter(|(_, n)| *n > 0);
-        let reasons: Vec<String> = reasons
-            .map(|(why, n)| format!("{} {}", count(n), why.words()))
-            .collect();
         let [x, y] = first.centre_nm.map(|nm| nm * 1e-3);
         Some(Self {
             count: left_out,
@@ -41,7 +37,7 @@ impl LeftOut {
                 "not understood: {} of {} shapes on layer {layer} ({}); the first is {} at ({x:.3}, {y:.3}) um",
                 count(left_out),
                 count(all),
-                reasons.join(", "),
+                found.oddities.by_why.words(),
                 first.why.words(),
             ),
             is_much: left_out as f64 >= MOST_LEFT_OUT * all as f64,

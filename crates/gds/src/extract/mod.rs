@@ -25,7 +25,7 @@ mod unrecognised_shapes;
 pub use left_out::{LeftOut, MOST_LEFT_OUT};
 pub use plan::{Elements, ExtractedElement, Extraction, ExtractionPlan};
 pub use survey::{LayerSummary, Survey, TextSummary};
-pub use unrecognised_shapes::{UnrecognisedShape, UnrecognisedShapes, Why};
+pub use unrecognised_shapes::{ReasonCounts, UnrecognisedShape, UnrecognisedShapes, Why};
 
 use std::path::Path;
 

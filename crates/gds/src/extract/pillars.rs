@@ -15,10 +15,6 @@ use crate::{
 use metalith_pillars::PillarShape;
 use std::path::{Path, PathBuf};
 
-/// Shapes before the first pillar of a design, after which the layout is taken for another design's: lenses of 1 mm have fewer, and
-/// seconds pass.
-const MOST_BEFORE_A_PILLAR: u64 = 10_000_000;
-
 /// Fills width maps from the shapes of a layout, and lists what is no pillar.
 pub(super) struct PillarCollector {
     /// The layout that is read, for errors.
@@ -91,12 +87,9 @@ impl PillarCollector {
         };
         let in_element = self.filler.may_be_of_element(r);
         self.oddities.add(oddity, in_element, self.listed);
-        let shapes = self.oddities.total();
-        if self.given && shapes >= MOST_BEFORE_A_PILLAR && self.filler.pillars() == 0 {
-            let cause = ExtractionError::NotOfDesign {
-                shapes,
-                reasons: self.oddities.reasons(),
-            };
+        if self.given
+            && let Err(cause) = self.filler.check_of_design(self.oddities.by_why)
+        {
             let path = self.path.clone();
             return Err(Error::Extraction { path, cause }.into());
         }

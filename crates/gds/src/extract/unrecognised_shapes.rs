@@ -1,6 +1,9 @@
 //! Shapes on the pillar layer that are not pillars on their lattice.
 
-use serde::Serialize;
+use std::ops::Index;
+
+use metalith_core::text::count;
+use serde::{Serialize, Serializer};
 
 /// Reason why a shape is not a pillar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -28,7 +31,7 @@ pub enum Why {
 }
 
 impl Why {
-    /// All reasons, in the order of [`UnrecognisedShapes::by_why`].
+    /// All reasons.
     pub const ALL: [Self; 9] = [
         Self::OffLattice,
         Self::UnequalSides,
@@ -69,12 +72,57 @@ pub struct UnrecognisedShape {
     pub offset: u64,
 }
 
+/// Numbers of shapes that are no pillars, by the reason. In JSON an object with a key for each reason that was met.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReasonCounts([u64; Why::ALL.len()]);
+
+impl ReasonCounts {
+    /// Count one shape.
+    pub fn add(&mut self, why: Why) {
+        self.0[why as usize] += 1;
+    }
+
+    /// Number of all.
+    pub fn total(&self) -> u64 {
+        self.0.iter().sum()
+    }
+
+    /// Reasons that were met, each with its number.
+    pub fn met(self) -> impl Iterator<Item = (Why, u64)> {
+        Why::ALL.into_iter().zip(self.0).filter(|(_, shapes)| *shapes > 0)
+    }
+
+    /// Numbers and reasons in words, the largest number first.
+    pub fn words(self) -> String {
+        let mut met: Vec<(Why, u64)> = self.met().collect();
+        met.sort_by_key(|(_, shapes)| std::cmp::Reverse(*shapes));
+        let words = met
+            .iter()
+            .map(|(why, shapes)| format!("{} {}", count(*shapes), why.words()));
+        words.collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl Index<Why> for ReasonCounts {
+    type Output = u64;
+
+    fn index(&self, why: Why) -> &u64 {
+        &self.0[why as usize]
+    }
+}
+
+impl Serialize for ReasonCounts {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_map(self.met())
+    }
+}
+
 /// Shapes that are not pillars: the first of them, and the number of all.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct UnrecognisedShapes {
     pub listed: Vec<UnrecognisedShape>,
-    /// Number for each of [`Why::ALL`].
-    pub by_why: [u64; 9],
+    /// Numbers by the reason.
+    pub by_why: ReasonCounts,
     /// Number of those that may be pillars of an element: on its lattice, or no wider than two pitches and not alone.
     #[serde(skip)]
     pub in_elements: u64,
@@ -86,19 +134,11 @@ pub struct UnrecognisedShapes {
 impl UnrecognisedShapes {
     /// Number of all.
     pub fn total(&self) -> u64 {
-        self.by_why.iter().sum()
-    }
-
-    /// Reasons with the number of shapes of each, the largest first.
-    pub(super) fn reasons(&self) -> String {
-        let mut found: Vec<(u64, Why)> = self.by_why.into_iter().zip(Why::ALL).filter(|(n, _)| *n > 0).collect();
-        found.sort_by_key(|(n, _)| std::cmp::Reverse(*n));
-        let words = found.iter().map(|(n, why)| format!("{n} {}", why.words()));
-        words.collect::<Vec<_>>().join(", ")
+        self.by_why.total()
     }
 
     pub(super) fn add(&mut self, oddity: UnrecognisedShape, in_element: bool, most: usize) {
-        self.by_why[oddity.why as usize] += 1;
+        self.by_why.add(oddity.why);
         if in_element {
             self.in_elements += 1;
             self.first.get_or_insert(oddity);

@@ -154,7 +154,7 @@ fn squares_are_read_to_half_a_step_a_corner() {
                 gds.rect(1, x, y, x + w, y + h);
             }
         });
-        let unequal = read.oddities.by_why[Why::UnequalSides as usize];
+        let unequal = read.oddities.by_why[Why::UnequalSides];
         assert_eq!(unequal, u64::from(want.is_none()), "{width} x {height}");
         let other = read.elements[0].widths.number.iter().find(|n| ![0, 140].contains(*n));
         assert_eq!(other.copied(), want, "{width} x {height}");
@@ -318,8 +318,8 @@ fn squares_and_circles_stand_in_one_lens() {
     });
     assert_eq!(read.shape, PillarShape::Mixed);
     assert_eq!(read.pillars, places.len() as u64 - 5);
-    assert_eq!(read.oddities.by_why[Why::Cross as usize], 3);
-    assert_eq!(read.oddities.by_why[Why::Ring as usize], 2);
+    assert_eq!(read.oddities.by_why[Why::Cross], 3);
+    assert_eq!(read.oddities.by_why[Why::Ring], 2);
     assert_eq!(read.oddities.in_elements, 5);
     let numbers = read.elements[0].widths.number.iter().filter(|n| **n > 0);
     let circle = SquaresAndCircles::number(true, 150).unwrap().0;

@@ -1,6 +1,5 @@
 //! Content of the front page and of `handoff.json` of a layout.
 
-use metalith_gds::extract::Why;
 use serde::Serialize;
 
 use super::central;
@@ -73,14 +72,18 @@ impl FoundPillars {
     pub(super) fn of(pattern: &Pattern) -> Option<Self> {
         let Pattern::Pillars(found) = pattern else { return None };
         let lattice = central(found).site.lattice;
-        let others = Why::ALL.into_iter().zip(found.oddities.by_why).filter(|(_, n)| *n > 0);
         Some(Self {
             pillars: found.pillars,
             shape: found.shape.plural(),
             elements: found.elements.len(),
             pitch_nm: lattice.pitch_nm().nm(),
             lattice: lattice.kind().to_string(),
-            others: others.map(|(why, n)| (why.words().to_owned(), n)).collect(),
+            others: found
+                .oddities
+                .by_why
+                .met()
+                .map(|(why, n)| (why.words().to_owned(), n))
+                .collect(),
         })
     }
 }

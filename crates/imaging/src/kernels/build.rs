@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use metalith_core::{Progress, Result, numerical_aperture};
+use metalith_core::{Progress, Quiet, Result, numerical_aperture};
 use metalith_optics::SharedFields;
 use metalith_wave::kernels::FftScratch;
 use metalith_wave::{Accuracy, PlaneWave, Psf, Scratch, Window};
@@ -81,7 +81,7 @@ impl KernelBank {
                 }
                 let builder = Builder {
                     element,
-                    light: &nodes.timed(|| chip.in_light(element, &all, progress))?,
+                    light: &nodes.timed(|| chip.in_light(element, &all, &Quiet(progress)))?,
                     view: chip.distinct[element].view,
                     chip,
                     basis,

@@ -31,10 +31,10 @@ mod warp;
 use std::borrow::Cow;
 use std::sync::OnceLock;
 
-use metalith_restoration::{FrameModel, Planes};
+use metalith_restoration::{FrameModel, Planes, sums_of_blocks};
 use metalith_sensor::Camera;
 use metalith_wave::kernels::{FftScratch, box_sums};
-use ndarray::{Array2, Axis, Slice};
+use ndarray::Array2;
 use rayon::prelude::*;
 
 use crate::acceptance::Acceptance;
@@ -59,14 +59,12 @@ pub struct FrameOperator<'a> {
     smoothing: Smoothing,
     /// Pixels an axis that are one value of the frame.
     value: usize,
-    /// Parts of the coarse operator, if there is one.
-    coarse: Option<CoarseParts<'a>>,
-    /// The coarse operator, once it was asked for.
-    made: OnceLock<Box<FrameOperator<'a>>>,
+    coarse: Option<CoarseOperator<'a>>,
 }
 
-/// Parts of a coarse [`FrameOperator`].
-struct CoarseParts<'a> {
+/// Coarse [`FrameOperator`], which is made when it is asked for.
+struct CoarseOperator<'a> {
+    made: OnceLock<Box<FrameOperator<'a>>>,
     bank: &'a KernelBank,
     stray_light: &'a StrayLight,
     elements: Vec<ElementView>,
@@ -79,8 +77,8 @@ struct CoarseParts<'a> {
 /// few steps do not bring it back. Pictures of 800 x 800 over 80 and 90 degrees behind `cameras/gt1930.toml` have 2.3 and 2.0.
 const LEAST_STEP: f64 = 1.5;
 
-impl<'a> CoarseParts<'a> {
-    /// Parts of the operator with blocks in place of squares, and pictures of half as many rows and columns. None for other grids,
+impl<'a> CoarseOperator<'a> {
+    /// The operator with blocks in place of squares, and pictures of half as many rows and columns. None for other grids,
     /// where squares are less than [`LEAST_STEP`] pixels of the scene apart, and where one kernel is taken for a field.
     fn of(
         (bank, stray_light): (&'a KernelBank, &'a StrayLight),
@@ -99,6 +97,7 @@ impl<'a> CoarseParts<'a> {
         };
         let frame_limits = step >= LEAST_STEP && !detail.assumed.fixed_kernels;
         (detail.points == ScenePoints::OneASquare && space.is_flat() && frame_limits).then(|| Self {
+            made: OnceLock::new(),
             bank,
             stray_light,
             elements: elements.to_vec(),
@@ -111,15 +110,17 @@ impl<'a> CoarseParts<'a> {
         })
     }
 
-    fn operator(&self) -> FrameOperator<'a> {
-        FrameOperator::new(
-            self.bank,
-            self.stray_light,
-            &self.elements,
-            &self.camera,
-            &self.space,
-            self.detail.clone(),
-        )
+    fn operator(&self) -> &FrameOperator<'a> {
+        self.made.get_or_init(|| {
+            Box::new(FrameOperator::new(
+                self.bank,
+                self.stray_light,
+                &self.elements,
+                &self.camera,
+                &self.space,
+                self.detail.clone(),
+            ))
+        })
     }
 }
 
@@ -145,7 +146,7 @@ impl<'a> FrameOperator<'a> {
             }
             _ => 0.0,
         };
-        let coarse = CoarseParts::of((bank, stray_light), elements, camera, space, &detail, step);
+        let coarse = CoarseOperator::of((bank, stray_light), elements, camera, space, &detail, step);
         let value = detail.points.value();
         let acceptance = Acceptance::new(elements, sensor);
         let accepted = |i: usize| acceptance.over_sensor(i).map(|shares| means_of_blocks(&shares, value));
@@ -167,7 +168,6 @@ impl<'a> FrameOperator<'a> {
             smoothing: Smoothing::new(step),
             value,
             coarse,
-            made: OnceLock::new(),
         }
     }
 
@@ -240,12 +240,8 @@ impl<'a> FrameOperator<'a> {
 
 /// Means over blocks of `side` values an axis.
 fn means_of_blocks(values: &Array2<f32>, side: usize) -> Array2<f32> {
-    let shape = [values.nrows(), values.ncols()].map(|n| n.div_ceil(side));
-    Array2::from_shape_fn(shape, |(y, x)| {
-        let own = |i: usize, n: usize| Slice::from(i * side..((i + 1) * side).min(n));
-        let rows = values.slice_axis(Axis(0), own(y, values.nrows()));
-        rows.slice_axis(Axis(1), own(x, values.ncols())).mean().unwrap_or(0.0)
-    })
+    let counts = sums_of_blocks(&Array2::ones(values.raw_dim()), side);
+    sums_of_blocks(values, side) / counts
 }
 
 /// Light in each pixel, by channel: share of a channel's light that arrives at a lens from a unit of projected solid
@@ -279,9 +275,8 @@ impl FrameModel for FrameOperator<'_> {
     }
 
     fn coarse(&self) -> Option<(usize, &dyn FrameModel)> {
-        let parts = self.coarse.as_ref()?;
-        let operator = self.made.get_or_init(|| Box::new(parts.operator()));
-        Some((operator.value, &**operator))
+        let operator = self.coarse.as_ref()?.operator();
+        Some((operator.value, operator))
     }
 
     fn apply_elements(&self, scene: &[Array2<f32>], elements: &[usize], stray_light: bool) -> Planes {

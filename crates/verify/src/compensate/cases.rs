@@ -9,7 +9,7 @@ use super::line::Line;
 use crate::optics::incidence;
 use crate::{PsfResult, open_matched};
 use metalith_cell::{Illumination, Incidence, PolarisationAxis, PolarisedLight};
-use metalith_core::{Progress, Result};
+use metalith_core::{Progress, Result, Steps};
 use metalith_design::array::PillarArray;
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, Element};
@@ -56,7 +56,7 @@ pub fn compensation_cases(
     let found = read_pillars(design, layout, progress)?;
     let lens = LensPhase::of(design);
     let work = intended.classes.len() * line.colours.len();
-    progress.begin("simulating elements", work as u64);
+    let steps = Steps::begin(progress, "simulating elements", work as u64);
     let mut cases = Vec::new();
     for class in 0..intended.classes.len() {
         let place = intended.placed.iter().position(|p| p.class == class).unwrap_or(0);
@@ -65,7 +65,7 @@ pub fn compensation_cases(
         let element = intended.placed[place].element;
         let phase = ElementPhase::of(&lens, &element);
         let drawn = [plain.as_ref(), corrected];
-        cases.extend(of_element(design, line, (&element, &phase), drawn, progress)?);
+        cases.extend(of_element(design, line, (&element, &phase), drawn, &steps)?);
     }
     Ok(cases)
 }
@@ -76,7 +76,7 @@ fn of_element(
     line: &Line,
     (element, phase): (&Element, &ElementPhase<'_>),
     [plain, corrected]: [&PillarMap; 2],
-    progress: &dyn Progress,
+    steps: &Steps<'_>,
 ) -> Result<Vec<CompensationCase>> {
     let (focal_um, opening_um) = (
         design.lens_of(element).focal_length_um,
@@ -95,7 +95,7 @@ fn of_element(
     let mut scratch = Scratch::default();
     let mut cases = Vec::new();
     for colour in &line.colours {
-        progress.check_stopped()?;
+        steps.check_stopped()?;
         let um = colour.wavelength_um;
         let wave = incident(&element.wedge, um, [0.0, 0.0])?;
         let light = Illumination {
@@ -109,7 +109,7 @@ fn of_element(
         let matched = open_matched(design, element, phase, [chief[0], chief[1], focal_um], um).scaled(colour.full);
         for ((pillars, chip, _), made) in chips.iter().zip(&made) {
             let psf = chip
-                .view(made, &light, progress)?
+                .view(made, &light, steps)?
                 .psf(window, Accuracy::Accurate, &drawn, &mut scratch)?;
             cases.push(CompensationCase {
                 element: element.label(),
@@ -120,7 +120,7 @@ fn of_element(
                 psf,
             });
         }
-        progress.advance(1);
+        steps.done();
     }
     Ok(cases)
 }

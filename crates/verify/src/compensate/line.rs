@@ -5,7 +5,7 @@ use num_complex::Complex64;
 use metalith_cell::{
     CellModel, CellResponse, FocusingStack, JonesTables, PointwiseCell, PolarisationAxis, PolarisedTables, cache_folder,
 };
-use metalith_core::{Error, Progress, Result};
+use metalith_core::{Error, Progress, Result, Steps};
 use metalith_design::Design;
 use metalith_optics::{AsBuiltChip, CalibratedModel, Perturbation};
 use metalith_pillars::{PillarMap, PillarShape};
@@ -115,14 +115,18 @@ impl Line {
     /// If a cell cannot be solved, or the user stopped it.
     pub(crate) fn solve(&mut self, least: i32, most: i32, progress: &dyn Progress) -> Result<()> {
         let steps: Vec<i32> = (least..=most).collect();
-        progress.begin("pillars as they are made", (self.colours.len() * steps.len()) as u64);
+        let of_all = Steps::begin(
+            progress,
+            "pillars as they are made",
+            (self.colours.len() * steps.len()) as u64,
+        );
         self.first_step = least;
         for colour in &mut self.colours {
             colour.made = vec![Vec::new(); self.drawn.len()];
             for &step in &steps {
-                let row = made(&self.chip, &self.drawn, step, colour, progress)?;
+                let row = made(&self.chip, &self.drawn, step, colour, &of_all)?;
                 colour.made.iter_mut().zip(row).for_each(|(to, t)| to.push(t));
-                progress.advance(1);
+                of_all.done();
             }
         }
         Ok(())

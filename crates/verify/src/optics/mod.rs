@@ -10,8 +10,7 @@ use super::case::SimulationCases;
 use super::distinct_elements::{Chosen, CopyAngle};
 use super::psf_metrics::{PsfImages, PsfPair, PsfResult};
 use metalith_cell::{Illumination, Incidence};
-use metalith_core::Progress;
-use metalith_core::Result;
+use metalith_core::{Progress, Result, Steps};
 use metalith_design::phase::ElementPhase;
 use metalith_design::{CellIncidence, Design, Element, FieldAngle, LensSpec};
 use metalith_optics::{CaseOptics, ElementOptics, IncoherentFields, Placement, SimulationCase};
@@ -74,17 +73,15 @@ impl<'a> ElementSimulator<'a> {
     pub(crate) fn solve(&self, chosen: &[Chosen], progress: &dyn Progress) -> Result<()> {
         let lit: Vec<(&Element, FieldAngle)> = chosen.iter().flat_map(all_angles).collect();
         let colours = &self.design.verify.wavelengths_um;
-        if incidence(self.design) == Incidence::Oblique {
-            let all = lit.len() * colours.len() * self.cases.len();
-            progress.begin("solving cells for oblique light", all as u64);
-        }
+        let all = lit.len() * colours.len() * self.cases.len();
+        let steps = Steps::begin(progress, "solving cells", all as u64);
         for &um in colours {
             for (element, field) in &lit {
                 let wave = arriving(element, um, *field)?;
                 for case in &self.cases {
-                    self.in_middle(element, um, |light| case.response(light, progress))?;
-                    self.in_light(element, &wave, |light| case.response(light, progress))?;
-                    progress.advance(1);
+                    self.in_middle(element, um, |light| case.response(light, &steps))?;
+                    self.in_light(element, &wave, |light| case.response(light, &steps))?;
+                    steps.done();
                 }
             }
         }
@@ -162,7 +159,7 @@ impl<'a> ElementSimulator<'a> {
         one: &Chosen,
         phase: &ElementPhase<'_>,
         read: &ReadElement<'_>,
-        progress: &dyn Progress,
+        progress: &Steps<'_>,
     ) -> Result<Vec<PsfPair>> {
         let element = &one.element;
         // The phase before mapping and rounding, once for all colours and angles.
@@ -207,7 +204,7 @@ impl<'a> ElementSimulator<'a> {
             let pairs = tasks.into_par_iter().map_init(Scratch::default, |scratch, task| {
                 progress.check_stopped()?;
                 let pair = self.pair(&task, (element, phase), designed, scratch);
-                progress.advance(1);
+                progress.done();
                 pair
             });
             let pairs = pairs.collect::<Result<Vec<_>>>()?.into_iter();
@@ -228,7 +225,7 @@ impl<'a> ElementSimulator<'a> {
         element: &Element,
         phase: &ElementPhase<'_>,
         read: &ReadElement<'_>,
-        progress: &dyn Progress,
+        progress: &Steps<'_>,
     ) -> Result<Vec<ThroughFocus>> {
         let (lens, spec) = (self.design.lens_of(element), &self.design.verify);
         let sensor_um = lens.focal_length_um;
@@ -250,7 +247,7 @@ impl<'a> ElementSimulator<'a> {
             )?;
             let full = self.judge().case().full_transmission(wavelength_um)?;
             let perfect = self.perfect(element, phase, chief, wavelength_um).scaled(full);
-            progress.advance(1);
+            progress.done();
             Ok(ThroughFocus::of(
                 psfs,
                 &perfect,

@@ -16,7 +16,7 @@ use super::psf_metrics::asked_words;
 use super::{ElementCheck, PhaseErrors, SimulationCases, phase_errors};
 use light::{Lit, Sums};
 use metalith_cell::Illumination;
-use metalith_core::{Progress, Result, numerical_aperture};
+use metalith_core::{Progress, Result, Steps, numerical_aperture};
 use metalith_design::array::{PillarArray, PillarRule};
 use metalith_design::phase::{ElementPhase, LensPhase};
 use metalith_design::{Design, Element, FieldAngle};
@@ -156,14 +156,14 @@ impl SampledZones {
         let chosen = distinct_elements::choose(design, array, checks, symmetric);
         simulator.solve(&chosen, progress)?;
         let psfs: usize = chosen.iter().map(|one| simulator.psfs(one)).sum();
-        progress.begin("sampling zones", (psfs * PATCHES) as u64);
+        let steps = Steps::begin(progress, "sampling zones", (psfs * PATCHES) as u64);
         let element = |one: &Chosen| {
             let phase = ElementPhase::of(&lens, &one.element);
             Sampler {
                 design,
                 simulator: &simulator,
                 phase: &phase,
-                progress,
+                progress: &steps,
             }
             .element(one, widths[one.index])
         };
@@ -185,7 +185,7 @@ struct Sampler<'a> {
     design: &'a Design,
     simulator: &'a ElementSimulator<'a>,
     phase: &'a ElementPhase<'a>,
-    progress: &'a dyn Progress,
+    progress: &'a Steps<'a>,
 }
 
 impl Sampler<'_> {
@@ -263,7 +263,7 @@ impl Sampler<'_> {
             let read = self.simulator.read(element, &tiles.map)?;
             let fields = |light: &Illumination<'_>| read.cases[0].in_light(light, self.progress);
             let sums = Sums::of(tiles, &self.simulator.in_light(element, &wave, fields)?, &lit)?;
-            self.progress.advance(1);
+            self.progress.done();
             Ok(sums)
         };
         let sums = parts.par_iter().map(sums).collect::<Result<_>>()?;

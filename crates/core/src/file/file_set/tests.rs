@@ -145,7 +145,7 @@ fn what_is_not_complete_replaces_nothing() {
     let words = failed.unwrap_err().to_string();
     insta::assert_snapshot!(words.replace(&*place.path().to_string_lossy(), "FOLDER"), @"
     cannot write FOLDER/b.json: no storage space
-      help: free space or choose another folder with --out; nothing was replaced
+      help: free space or choose another folder; nothing was replaced
     ");
     assert_eq!(names(place.path()), before);
     // A folder where a file is to stand.
