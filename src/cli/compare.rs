@@ -13,6 +13,7 @@ use metalith::report::counted;
 use metalith::study::plan_comparison;
 use metalith::{Design, Error, Result};
 
+use super::course::Course;
 use super::exposure_args::{self, ExposureArgs};
 use super::paths::paths;
 use super::picture::Assume;
@@ -295,6 +296,9 @@ pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome> {
         return Ok(Outcome::Fine);
     }
     let cache = KernelCache::of_user();
+    let ways = comparison.methods.len() * if comparison.separate { 2 } else { 1 };
+    let cameras = comparison.designs.len() + comparison.lensless.len();
+    terminal.follow(Course::of_pictures(cameras, comparison.photographs.len() * ways));
     let open = comparison.open(terminal)?;
     open.notes().iter().for_each(|note| terminal.say(note));
     let time_ms = open.equal_time_ms(&cache, terminal)?;

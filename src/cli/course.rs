@@ -8,7 +8,7 @@ use metalith::Design;
 
 /// One piece of work.
 struct Piece {
-    /// Name with which the library begins it.
+    /// First words of the name with which the library begins it.
     what: &'static str,
     /// Time that it is expected to take (s on two cores): a guess, which what was done before corrects.
     seconds: f64,
@@ -55,8 +55,22 @@ impl PerByte {
 /// Nanoseconds for each site of a design: its pillars made, written, read as cells and as pillars.
 const SITE: [f64; 4] = [10.0, 33.0, 10.0, 78.0];
 
-/// Nanoseconds for each site, wavelength and field angle of a simulation.
-const SITE_IN_LIGHT: f64 = 50.0;
+/// Nanoseconds for each site and PSF of a simulation, and PSFs of a distinct element beside those of `[verify]`: of polychromatic light
+/// and out of focus.
+const SITE_OF_PSF: f64 = 20.0;
+const OTHER_PSFS: usize = 24;
+
+/// Seconds for the kernels of a camera, for its stray light, and for each picture of 800 x 800 pixels.
+const KERNELS: f64 = 60.0;
+const STRAY_LIGHT: f64 = 30.0;
+const PICTURE: f64 = 15.0;
+
+/// Seconds for a layout that is read, a frame that is simulated, and an operator that is compared with the simulation.
+const READING_AND_FRAME: f64 = 4.0;
+
+/// Names of work of the program that is no library's.
+pub(crate) const FRAME: &str = "simulating the frame";
+pub(crate) const OPERATOR: &str = "comparing the operator with the simulation";
 
 impl Course {
     fn of(pieces: impl IntoIterator<Item = (&'static str, f64)>) -> Self {
@@ -73,14 +87,17 @@ impl Course {
             let radius_um = design.lens_of(element).radius_um();
             std::f64::consts::PI * radius_um.powi(2) / design.lattice().cell_um2()
         };
-        let seconds = 1e-9 * design.elements().iter().map(sites).sum::<f64>();
-        let light = design.verify.wavelengths_um.len() * design.verify.field_angles.len();
+        let elements = design.elements();
+        let seconds = 1e-9 * elements.iter().map(sites).sum::<f64>();
+        let psfs = design.verify.wavelengths_um.len() * design.verify.field_angles.len() + OTHER_PSFS;
+        // Copies of an element are not simulated: of an array about one in four is none.
+        let distinct = (1.0 + 0.25 * (elements.len() - 1) as f64) / elements.len() as f64;
         let [made, written, cells, pillars] = SITE.map(|ns| ns * seconds);
         let writing = is_written.then_some(("writing pillars", written));
         let read = [
             ("reading cells", cells),
             ("reading pillars", pillars),
-            ("simulating elements", SITE_IN_LIGHT * light as f64 * seconds),
+            ("simulating elements", SITE_OF_PSF * psfs as f64 * distinct * seconds),
         ];
         Self::of(
             [("widths of the elements", made)]
@@ -88,6 +105,12 @@ impl Course {
                 .chain(writing)
                 .chain(read),
         )
+    }
+
+    /// The pillars of a design made and written, where symmetries leave an eighth of them.
+    pub(crate) fn of_layout(design: &Design) -> Self {
+        let pieces = Self::of_verification(design, true).pieces.into_iter().take(2);
+        Self::of(pieces.map(|piece| (piece.what, piece.seconds)))
     }
 
     /// A layout read and checked against rules.
@@ -114,10 +137,26 @@ impl Course {
         ])
     }
 
+    /// Kernels, stray light and frames of each camera, and so many pictures restored from the frames of each.
+    pub(crate) fn of_pictures(cameras: usize, pictures: usize) -> Self {
+        let camera = [
+            ("reading the layout", READING_AND_FRAME),
+            ("simulating kernels", KERNELS),
+            ("tracing the stray light", STRAY_LIGHT),
+            (FRAME, READING_AND_FRAME),
+            (OPERATOR, READING_AND_FRAME),
+        ];
+        let restoring = std::iter::repeat_n(("restoring", PICTURE), pictures);
+        let all = std::iter::repeat_n(camera.into_iter().chain(restoring), cameras);
+        Self::of(all.flatten())
+    }
+
     /// Work of this name begins.
     pub(crate) fn begin(&mut self, what: &str, now: Instant) {
         self.end(now);
-        let next = self.pieces[self.begun..].iter().position(|piece| piece.what == what);
+        let next = self.pieces[self.begun..]
+            .iter()
+            .position(|piece| what.starts_with(piece.what));
         if let Some(next) = next {
             self.begun += next + 1;
             self.present = Some(now);
@@ -133,32 +172,43 @@ impl Course {
 
     /// Place of the present work, of which a share is done after a time.
     pub(crate) fn place(&self, share: f64, after: Duration) -> CoursePlace {
+        /// Share of a piece from which on its own time counts more than the expected one.
+        const KNOWN: f64 = 0.05;
+        /// Times of a piece beyond which it is not known how long it lasts, while it reports nothing.
+        const OVERDUE: f64 = 1.5;
         let (share, after_s) = (share.clamp(0.0, 1.0), after.as_secs_f64());
-        let by_itself = (share > 0.0).then(|| after_s * (1.0 - share) / share);
         let all: f64 = self.pieces.iter().map(|piece| piece.seconds).sum();
-        if all <= 0.0 {
+        let is_after_all = self.present.is_none() && self.begun == self.pieces.len();
+        if all <= 0.0 || is_after_all {
             return CoursePlace {
                 step: None,
                 share,
-                left_s: by_itself,
+                left_s: (share > 0.0).then(|| after_s * (1.0 - share) / share),
             };
         }
         let number = self.present.and(self.begun.checked_sub(1));
         let expected_s = number.map_or(0.0, |last| self.pieces[last].seconds);
         let later_s: f64 = self.pieces[self.begun..].iter().map(|piece| piece.seconds).sum();
         // Pieces take longer than expected on a slow machine: as those did that are done.
+        let is_told = number.is_some() && share > 0.0;
         let [expected, took] = [
             self.ended[0] + share * expected_s,
-            self.ended[1] + if number.is_some() { after_s } else { 0.0 },
+            self.ended[1] + if is_told { after_s } else { 0.0 },
         ];
         let slowness = if expected > 0.01 * all { took / expected } else { 1.0 };
-        // The longer a piece is at work, the better it tells its own time.
-        let guessed = (1.0 - share) * slowness * expected_s;
-        let own_s = by_itself.map_or(guessed, |by_itself| share * by_itself + (1.0 - share) * guessed);
+        let guessed_s = slowness * expected_s;
+        let own_s = if share > 0.0 {
+            let known = if expected_s > 0.0 { KNOWN } else { 0.0 };
+            Some(((after_s + known * guessed_s) / (share + known) - after_s).max(0.0))
+        } else if number.is_none() {
+            Some(0.0)
+        } else {
+            (after_s < OVERDUE * guessed_s).then(|| (guessed_s - after_s).max(0.0))
+        };
         CoursePlace {
             step: number.map(|last| [last + 1, self.pieces.len()]),
             share: (all - later_s - (1.0 - share) * expected_s) / all,
-            left_s: Some(own_s + slowness * later_s),
+            left_s: own_s.map(|own_s| own_s + slowness * later_s),
         }
     }
 }
@@ -191,14 +241,23 @@ mod tests {
         assert_eq!(place.step, Some([1, 2]));
         assert_eq!(place.share, 0.125);
         // Twice as slow as expected: 10 s of its own, and twice 30 s.
-        assert_eq!(place.left_s, Some(70.0));
+        assert!((place.left_s.unwrap() - 70.0).abs() < 1e-9);
         // Work that nobody expected takes its own time, and those after it theirs.
         course.begin("cells", begun + Duration::from_secs(20));
         let place = course.place(0.5, Duration::from_secs(3));
-        assert_eq!((place.step, place.share, place.left_s), (None, 0.25, Some(61.5)));
+        assert_eq!((place.step, place.share), (None, 0.25));
+        assert!((place.left_s.unwrap() - 63.0).abs() < 0.5, "{:?}", place.left_s);
         course.begin("simulating", begun + Duration::from_secs(26));
-        let place = course.place(1.0, Duration::from_secs(60));
+        // While nothing is told, time passes; beyond its time it is not known.
+        let place = course.place(0.0, Duration::from_secs(20));
+        assert_eq!(place.left_s, Some(40.0));
+        assert_eq!(course.place(0.0, Duration::from_secs(100)).left_s, None);
+        let place = course.place(1.0, Duration::from_mins(1));
         assert_eq!((place.step, place.share, place.left_s), (Some([2, 2]), 1.0, Some(0.0)));
+        // So does work after all that was expected.
+        course.begin("packing", begun + Duration::from_secs(90));
+        let place = course.place(0.5, Duration::from_secs(3));
+        assert_eq!((place.step, place.share, place.left_s), (None, 0.5, Some(3.0)));
     }
 
     #[test]

@@ -14,6 +14,7 @@ use metalith::report::{count, counted, sig};
 use metalith::text::hex;
 use metalith::{Design, FolderLock, Hierarchy, PillarArray, Progress, Result, write_layer_properties};
 
+use super::course::Course;
 use super::out_folder::OutFolder;
 use super::paths::{inputs_of, paths};
 use super::{Outcome, Terminal, print_json, print_line, standard_input};
@@ -276,6 +277,7 @@ pub(crate) fn run(args: &LayoutArgs, terminal: &Terminal) -> Result<Outcome> {
         None => design.name.clone(),
     };
     let out = args.target.folder(&name, &args.design)?;
+    terminal.follow(Course::of_layout(&design));
     terminal.stop_on_interrupt();
     // What is written once is made once, when it is written; a model of the process compares all pillars many times.
     let is_written_once = args.compensate.is_none() && args.target.hierarchy(&design) == Hierarchy::Folded;

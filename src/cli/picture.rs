@@ -12,9 +12,10 @@ use metalith::imaging::{
 };
 use metalith::optics::CalibratedModel;
 use metalith::restoration::{LearnedDenoiser, RestorationMethod};
-use metalith::{Error, Result};
+use metalith::{Error, Progress, Result};
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};
+use super::course::{Course, FRAME, OPERATOR};
 use super::paths::{name_of, paths};
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
@@ -155,11 +156,18 @@ impl PictureArgs {
     }
 }
 
+/// Pictures that are restored for a forecast of scenes of some hundred pixels.
+const OF_FORECAST: usize = 2;
+
 pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     terminal.stop_on_interrupt();
     let methods = RestorationMethod::of_names(&args.method)?;
     let files = args.with.read(terminal)?;
     let others = [&args.depth, &args.prior].into_iter().filter_map(Option::as_deref);
+    let ways = if args.separate { 2 } else { 1 };
+    let is_forecast = !args.no_forecast && methods.contains(&RestorationMethod::Tikhonov);
+    let of_forecast = if is_forecast { OF_FORECAST } else { 0 };
+    terminal.follow(Course::of_pictures(1, methods.len() * ways + of_forecast));
     let inputs = files.inputs(&args.with, others.chain([args.layout.as_path(), args.scene.as_ref()]));
     let CameraFiles {
         mut design,
@@ -177,6 +185,7 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     if let Some(prior) = prior {
         system.prior = prior;
     }
+    terminal.begin(FRAME, 1);
     // Once: it is asked for again and again.
     let scene = system.simulated(&scene).into_owned();
     let simulation = system.simulation_of(&scene);
@@ -184,7 +193,8 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     let truth = system.truth(&scene);
     drop(simulation);
     let notes = system.notes(&frame, &truth);
-    notes.iter().for_each(|note| terminal.say(note));
+    notes.iter().for_each(|note| terminal.warn(note));
+    terminal.begin(OPERATOR, 1);
     let operator = system.restoration();
     let forecast_scene = ForecastScene::new(&system, &operator);
     let error = &forecast_scene.operator_error;

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metalith::Result;
 use metalith::file::InputFiles;
 use metalith::imaging::scene::SceneImage;
 use metalith::imaging::{
@@ -11,9 +10,11 @@ use metalith::imaging::{
     is_simulated, read_signals,
 };
 use metalith::restoration::{LearnedDenoiser, RestorationMethod};
+use metalith::{Progress, Result};
 use ndarray::Array3;
 
 use super::camera_args::{CameraArgs, CameraFiles, distance_um};
+use super::course::{Course, OPERATOR};
 use super::paths::{name_of, paths};
 use super::reading::ReadingArgs;
 use super::standard_input::InputFile;
@@ -112,6 +113,7 @@ pub(crate) fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
         white: args.white,
     };
     let signals = read_signals(&args.frame, &camera, numbers)?;
+    terminal.follow(Course::of_pictures(1, wanted.len()));
     let layout = InputFile::of(&args.layout)?.below(&args.reading.file, terminal)?;
     let prior = args.prior.as_deref().map(LearnedDenoiser::read).transpose()?;
     let mut system = ImagingSystem::open(&design, &layout, &camera, model.as_ref(), &scene, terminal)?;
@@ -123,13 +125,14 @@ pub(crate) fn run(args: &RestoreArgs, terminal: &Terminal) -> Result<Outcome> {
         system.exposure = system.exposure.by_white(&camera);
     }
     let frame = system.frame_of(signals)?;
+    terminal.begin(OPERATOR, 1);
     let operator = system.restoration();
     let forecast_scene = ForecastScene::new(&system, &operator);
     let error = &forecast_scene.operator_error;
     let mut notes = system.notes(&frame, &Array3::zeros((1, 1, 3)));
     notes.extend(error.note(&camera.channel_names()));
     for note in &notes {
-        terminal.say(note);
+        terminal.warn(note);
     }
     let mut restored = Vec::new();
     for (picture, method) in &wanted {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::IsTerminal;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -28,6 +28,9 @@ const BETWEEN_LINES: Duration = Duration::from_secs(30);
 /// Time between two drawings of a bar.
 const BETWEEN_BARS: Duration = Duration::from_millis(100);
 
+/// Time between two looks at work that reports nothing.
+const BETWEEN_TICKS: Duration = Duration::from_secs(1);
+
 /// Parts of a bar.
 const BAR_LENGTH: u64 = 1000;
 
@@ -38,10 +41,17 @@ const MOST_WARNINGS: usize = 3;
 pub struct Terminal {
     quiet: bool,
     strict: AtomicBool,
-    bar: Mutex<Option<ProgressBar>>,
-    told: Mutex<Told>,
+    shown: Arc<Shown>,
+    /// Set once a thread tells the time while a step lasts.
+    ticking: OnceLock<()>,
     /// Warnings that were printed: a layout may be opened more than once.
     warned: Mutex<BTreeSet<String>>,
+}
+
+/// What is shown of work, from any thread.
+struct Shown {
+    bar: Mutex<Option<ProgressBar>>,
+    told: Mutex<Told>,
 }
 
 /// Progress of work, and when it was told.
@@ -52,6 +62,8 @@ struct Told {
     note: Option<(String, bool)>,
     /// Time when the last line was written.
     at: Instant,
+    /// True once the wish to stop was answered.
+    is_stopping: bool,
 }
 
 /// Work that is at hand.
@@ -69,6 +81,7 @@ impl Told {
             work: None,
             note: None,
             at: now,
+            is_stopping: false,
         }
     }
 
@@ -150,27 +163,65 @@ fn ends_at_once(since: Duration) -> bool {
     since >= ONE_WISH
 }
 
+impl Shown {
+    fn bar(&self) -> MutexGuard<'_, Option<ProgressBar>> {
+        self.bar.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn told(&self) -> MutexGuard<'_, Told> {
+        self.told.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn say(&self, line: &str) {
+        let tell = || output::tell(&format!("{line}\n"));
+        match &*self.bar() {
+            Some(bar) => bar.suspend(tell),
+            None => tell(),
+        }
+    }
+
+    /// Draw the bar, or write a line of a log, if it is time for that.
+    fn tell(&self, change: impl FnOnce(&mut Told)) {
+        let (now, bar) = (Instant::now(), self.bar());
+        let mut told = self.told();
+        change(&mut told);
+        if let Some(bar) = &*bar {
+            if told.is_due(now, BETWEEN_BARS) {
+                told.draw(bar, now);
+            }
+            return;
+        }
+        // Lines go past the bar, which takes its lock.
+        drop(bar);
+        let line = (told.work.is_some() && told.is_due(now, BETWEEN_LINES))
+            .then(|| told.line(now))
+            .flatten();
+        drop(told);
+        if let Some(line) = line {
+            self.say(&line);
+        }
+    }
+}
+
 impl Terminal {
     /// A terminal that shows progress unless `quiet` is set.
     pub fn new(quiet: bool) -> Self {
         Self {
             quiet,
             strict: AtomicBool::new(false),
-            bar: Mutex::new(None),
-            told: Mutex::new(Told::new(Instant::now())),
+            shown: Arc::new(Shown {
+                bar: Mutex::new(None),
+                told: Mutex::new(Told::new(Instant::now())),
+            }),
+            ticking: OnceLock::new(),
             warned: Mutex::new(BTreeSet::new()),
         }
     }
 
     /// Print a line for a person, unless `--quiet`. Goes to standard error: standard output is for answers.
     pub fn say(&self, line: &str) {
-        if self.quiet {
-            return;
-        }
-        let tell = || output::tell(&format!("{line}\n"));
-        match &*self.bar() {
-            Some(bar) => bar.suspend(tell),
-            None => tell(),
+        if !self.quiet {
+            self.shown.say(line);
         }
     }
 
@@ -200,45 +251,26 @@ impl Terminal {
         self.quiet
     }
 
-    fn bar(&self) -> MutexGuard<'_, Option<ProgressBar>> {
-        self.bar.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn told(&self) -> MutexGuard<'_, Told> {
-        self.told.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Tell progress as that of a course, which begins now.
     pub(crate) fn follow(&self, course: Course) {
-        self.told().course = course;
+        self.shown.told().course = course;
     }
 
-    /// Draw the bar, or write a line of a log, if it is time for that.
-    fn tell(&self, change: impl FnOnce(&mut Told)) {
-        let (now, bar) = (Instant::now(), self.bar());
-        let mut told = self.told();
-        change(&mut told);
-        if let Some(bar) = &*bar {
-            if told.is_due(now, BETWEEN_BARS) {
-                told.draw(bar, now);
-            }
-            return;
-        }
-        // Lines go past the bar, which takes its lock.
-        drop(bar);
-        let line = (told.work.is_some() && told.is_due(now, BETWEEN_LINES))
-            .then(|| told.line(now))
-            .flatten();
-        drop(told);
-        if let Some(line) = line {
-            self.say(&line);
-        }
-    }
-
-    fn clear_bar(&self) {
-        if let Some(bar) = self.bar().take() {
-            bar.finish_and_clear();
-        }
+    /// Tell the time while a step lasts, from a thread that ends with the terminal.
+    fn tick(&self) {
+        self.ticking.get_or_init(|| {
+            let shown = Arc::downgrade(&self.shown);
+            std::thread::spawn(move || {
+                loop {
+                    std::thread::sleep(BETWEEN_TICKS);
+                    let Some(shown) = shown.upgrade() else { return };
+                    shown.tell(|_| ());
+                    if ASKED.get().is_some() && !std::mem::replace(&mut shown.told().is_stopping, true) {
+                        shown.say("stopping after the present step");
+                    }
+                }
+            });
+        });
     }
 
     /// Wait until no other process writes the files of a folder, which are made together. They replace none of the `inputs`.
@@ -270,8 +302,10 @@ impl Terminal {
 
     /// Take the progress bar off the screen.
     pub fn clear(&self) {
-        self.told().end();
-        self.clear_bar();
+        self.shown.told().end();
+        if let Some(bar) = self.shown.bar().take() {
+            bar.finish_and_clear();
+        }
     }
 }
 
@@ -281,21 +315,22 @@ impl Progress for Terminal {
             return;
         }
         let now = Instant::now();
-        self.told().begin(what, steps, now);
+        self.shown.told().begin(what, steps, now);
+        self.tick();
         if !std::io::stderr().is_terminal() {
             return;
         }
-        let mut bar = self.bar();
+        let mut bar = self.shown.bar();
         let bar = bar.get_or_insert_with(|| {
             let style = ProgressStyle::with_template("{msg:30} {wide_bar} {percent:>3} %  {prefix}")
                 .expect("the template is a constant");
             ProgressBar::new(BAR_LENGTH).with_style(style)
         });
-        self.told().draw(bar, now);
+        self.shown.told().draw(bar, now);
     }
 
     fn advance(&self, steps: u64) {
-        self.tell(|told| {
+        self.shown.tell(|told| {
             if let Some(work) = &mut told.work {
                 work.done += steps;
             }
@@ -303,11 +338,11 @@ impl Progress for Terminal {
     }
 
     fn note(&self, text: &str) {
-        if self.told().work.is_none() {
+        if self.shown.told().work.is_none() {
             self.say(text);
             return;
         }
-        self.tell(|told| told.note = Some((text.to_owned(), false)));
+        self.shown.tell(|told| told.note = Some((text.to_owned(), false)));
     }
 
     fn warn(&self, text: &str) {

@@ -169,9 +169,12 @@ impl Judging {
         match simulation {
             Simulation::Whole => {}
             Simulation::InParts { parts, needed_mb, .. } => terminal.say(&format!(
-                "note: large elements take about {needed_mb:.0} MB of memory: each field is simulated in at most {}, and other cell \
-                 models are not compared with the one that judges",
-                counted(*parts, "part")
+                "note: large elements take about {needed_mb:.0} MB of memory{}; other cell models are not compared with the one \
+                 that judges",
+                match *parts {
+                    1 => String::new(),
+                    parts => format!(", each field simulated in up to {parts} parts"),
+                }
             )),
             Simulation::Not(why) => {
                 terminal.say(&format!(

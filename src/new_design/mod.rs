@@ -166,6 +166,7 @@ impl NewDesign {
             self.out_of_range(),
             self.narrow_pillars(),
             self.exchanged_widths(),
+            self.squares_in_staggered_rows(),
         ];
         let found: Vec<Refusal> = found.into_iter().flatten().collect();
         let Some(first) = found.first() else { return Ok(()) };
@@ -221,7 +222,7 @@ impl NewDesign {
                 .and_then(|um| within("a focal length", um, &FOCAL_LENGTH.range)),
             (!(nm.is_finite() && nm > 0.0))
                 .then(|| (format!("a wavelength of {nm} nm"), "give a positive wavelength".into())),
-            (!(steering_deg.abs() < 90.0)).then(|| {
+            (steering_deg.is_nan() || steering_deg.abs() >= 90.0).then(|| {
                 let hint = "give steering of less than 90 degrees".into();
                 (format!("steering by {steering_deg} degrees"), hint)
             }),
@@ -242,6 +243,16 @@ impl NewDesign {
             id: OUT_OF_RANGE,
             what: format!("pillars {nm} nm wide"),
             hint: format!("give widths of {NARROWEST_NM} nm or more"),
+        })
+    }
+
+    /// Squares on a hexagonal lattice: their cell is solved for circles alone.
+    fn squares_in_staggered_rows(&self) -> Option<Refusal> {
+        let given = (self.shape == Some(PillarShape::Square)) && self.lattice == Some(LatticeKind::Hexagonal);
+        given.then(|| Refusal {
+            id: "new/squares-in-staggered-rows",
+            what: "square pillars on a hexagonal lattice".into(),
+            hint: "give `--shape circle`, or `--lattice square`".into(),
         })
     }
 

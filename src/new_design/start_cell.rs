@@ -9,7 +9,8 @@ use crate::text::printable;
 use crate::{LatticeKind, PillarShape, Result};
 
 /// Materials that are taken where none is named, each up to a wavelength (um), and the word for it.
-const FILMS: [(f64, &str); 4] = [
+const FILMS: [(f64, &str); 5] = [
+    (0.35, "sin_philipp_1973"),
     (0.4, "gan_barker_1973"),
     (0.85, "sin_luke_2015"),
     (2.0, "a_si_pierce_1972"),
@@ -39,7 +40,7 @@ impl Materials {
     /// Materials that are named, else those for a wavelength (um). Paths count from `folder`.
     pub(crate) fn new(film: Option<&str>, substrate: Option<&str>, wavelength_um: f64, folder: &Path) -> Result<Self> {
         let usual = FILMS.iter().find(|(most_um, _)| wavelength_um <= *most_um);
-        let usual = usual.map_or(FILMS[1].1, |(_, name)| name);
+        let usual = usual.map_or(FILMS[2].1, |(_, name)| name);
         let glass = if wavelength_um <= GLASS_UM {
             "fused_silica_malitson_1965"
         } else {

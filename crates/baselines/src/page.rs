@@ -3,6 +3,7 @@
 use metalith_core::{FolderLock, Result, srgb};
 use metalith_imaging::{Zone, shown};
 use metalith_report::{Axis, Cell, Chart, Column, Page, PhotoRow, Table, write_json};
+use metalith_sensor::ColourFilter;
 
 use crate::compare::{ComparedCamera, ComparisonResult};
 
@@ -56,8 +57,14 @@ fn page(comparison: &ComparisonResult) -> Page {
     } else {
         ""
     };
+    let is_scored = comparison.cameras.iter().flat_map(|camera| &camera.ways);
+    let lpips = if is_scored.into_iter().any(|way| way.one_less_lpips.is_some()) {
+        ""
+    } else {
+        "Without `--lpips` there is no LPIPS, which needs its weights."
+    };
     page.paragraph(format!(
-        "Means over the photographs: PSNR of the mean squared error, SSIM the mean. Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values unless stated otherwise. {timed}Frames of cameras without a lens are not pictures and have no scores. LPIPS needs its weights (`--lpips`); without them the column is empty."
+        "Means over the photographs: PSNR of the mean squared error, SSIM the mean. Zones are the middle, the four edges and the four corners of a division by three. PSNR and SSIM are of sRGB values unless stated otherwise. {timed}Frames of cameras without a lens are not pictures and have no scores. {lpips}"
     ));
     curves(&mut page, comparison);
     for camera in &comparison.cameras {
@@ -160,7 +167,11 @@ fn one(page: &mut Page, camera: &ComparedCamera) {
     for (way, picture) in restored.zip(&pictures.pictures) {
         row.photo(way.words(), &picture.mapv(srgb::encoded));
     }
-    page.figure(row.caption("The first photograph. The mosaic of a colour filter array is shown as colours."));
+    let mosaic = match pictures.frame.filter {
+        ColourFilter::None => "",
+        _ => " The mosaic of the colour filter array is shown as colours.",
+    };
+    page.figure(row.caption(format!("The first photograph.{mosaic}")));
 }
 
 #[cfg(test)]

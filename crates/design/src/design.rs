@@ -195,12 +195,28 @@ impl Design {
         self.optimise.within(band_um);
         self.check_bands(&stack)?;
         stack.check_substrate(band_um)?;
-        let named = [&self.verify.wavelengths_um, &self.mapping.comparison.wavelengths_um];
-        for um in named.into_iter().flatten().chain([&self.mapping.wavelength_um]) {
-            stack.full_transmission(*um)?;
-            for material in stack.materials() {
-                material.index(*um)?;
-            }
+        let named: [(&str, &[f64]); 3] = [
+            ("`wavelengths_nm` of [verify]", &self.verify.wavelengths_um),
+            ("the comparison of [mapping]", &self.mapping.comparison.wavelengths_um),
+            ("`wavelength_nm` of [mapping]", &[self.mapping.wavelength_um]),
+        ];
+        for (key, wavelengths_um) in named {
+            let known = wavelengths_um.iter().try_for_each(|um| {
+                stack.full_transmission(*um)?;
+                stack
+                    .materials()
+                    .try_for_each(|material| material.index(*um).map(|_| ()))?;
+                Ok(())
+            });
+            known.map_err(|error| match error {
+                Error::Invalid { id, what, hint, source } => Error::Invalid {
+                    id,
+                    what: format!("{}: {key}: {what}", self.path.display()),
+                    hint,
+                    source,
+                },
+                other => other,
+            })?;
         }
         Ok(self)
     }

@@ -115,7 +115,7 @@ pub fn text(report: &DrcReport) -> String {
 fn runs(report: &DrcReport) -> String {
     let mut run = 0;
     let mut others: [(&str, Vec<&str>); 3] =
-        ["not run", "not applicable", "not in force"].map(|word| (word, Vec::new()));
+        ["not run", "not applicable", "not in force without a design"].map(|word| (word, Vec::new()));
     for rule in &report.rules {
         let which = match rule.status {
             Status::Run => {

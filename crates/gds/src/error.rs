@@ -63,7 +63,7 @@ pub enum Error {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LayoutError {
-    #[error("the file ends {held} bytes into a record, before ENDLIB")]
+    #[error("{}", if *held == 0 { "the file ends before ENDLIB".to_owned() } else { format!("the file ends {held} bytes into a record, before ENDLIB") })]
     EndsEarly { held: usize },
     #[error("the file ends inside a {} record of {length} bytes, {held} of them there", record::name(*kind))]
     EndsInRecord { kind: u8, length: usize, held: usize },
@@ -383,7 +383,11 @@ impl ExtractionError {
                      symmetries: a smaller lens, or fewer elements in one layout"
                 )
             }
-            Self::NoElements { .. } => "name the layer that the pillars are on, or give the design".into(),
+            Self::NoElements { .. } => {
+                "name the layer that the pillars are on (`--layer 7/0`, or `layer` in a library call), or give a design that has them \
+                 there"
+                    .into()
+            }
             Self::WhichLayer { .. } => "name the layer of the pillars with --layer".into(),
             Self::Groups { most, .. } => format!("up to {most} elements are read; is this the layer of the pillars?"),
             Self::Scattered { .. } => {

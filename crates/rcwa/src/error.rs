@@ -84,7 +84,12 @@ pub enum Error {
     UnknownMaterial { name: String, known: Vec<&'static str> },
     #[error("a material has the index {n} + {k} i")]
     MaterialIndex { n: f64, k: f64 },
-    #[error("{material} is known from {from_um} to {to_um} um, not at {wavelength_um} um")]
+    #[error(
+        "{material} is known from {} to {} nm, not at {} nm",
+        in_nm(*from_um, f64::ceil),
+        in_nm(*to_um, f64::floor),
+        in_nm(*wavelength_um, f64::round)
+    )]
     OutOfRange {
         material: String,
         from_um: f64,
@@ -249,4 +254,14 @@ impl From<Error> for metalith_core::Error {
             },
         }
     }
+}
+
+/// A wavelength (um) in nanometres, to the picometre.
+fn in_nm(um: f64, whole: fn(f64) -> f64) -> f64 {
+    /// Rounding of a wavelength that is written in nanometres (pm).
+    const ROUNDING: f64 = 1e-3;
+    let pm = um * 1e6;
+    let near = pm.round();
+    let pm = if (pm - near).abs() < ROUNDING { near } else { whole(pm) };
+    pm / 1e3
 }

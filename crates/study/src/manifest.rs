@@ -140,6 +140,16 @@ pub fn is_planned(folder: &Path) -> bool {
 /// If there is none, or it is no manifest.
 pub(crate) fn read<T: DeserializeOwned>(folder: &Path) -> Result<T> {
     let path = folder.join(MANIFEST);
+    if folder.is_dir() && !is_planned(folder) {
+        return Err(Error::refused(
+            "study/not-planned",
+            format!(
+                "{} holds no {MANIFEST}: a plan was not completed there, or none was begun",
+                folder.display()
+            ),
+            "plan into this folder first: `metalith study plan`, or `--plan` of `metalith dataset`, `compare`, `optimise`",
+        ));
+    }
     let mut bytes = read_at_most(&path, LONGEST, "the manifest of a plan")?;
     let refused = |id, why| {
         let what = format!("{} {why}", path.display());

@@ -181,7 +181,13 @@ pub(crate) fn run(args: &NewArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let text = FileKind::Design.reference() + &made.text;
     // What cannot be is said before a file stands there.
-    let design = Design::parse_without_library(&args.design, &text)?;
+    let design = Design::parse_without_library(&args.design, &text).inspect_err(|_| {
+        terminal.clear();
+        terminal.say(&format!(
+            "{} is not written: the options make a design with mistakes",
+            args.design.display()
+        ));
+    })?;
     terminal.warnings(&design.warnings()?);
     AtomicFile::write(&args.design, text.as_bytes())?;
     FileKind::Design.write_beside(&args.design)?;

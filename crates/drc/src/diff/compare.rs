@@ -183,8 +183,10 @@ impl Changes {
         let column = tile(bounds_nm[0], bounds_nm[2], x0, x1, map.columns);
         let row = tile(bounds_nm[1], bounds_nm[3], y0, y1, map.rows);
         let tile = row * map.columns + column;
+        if map.counts[tile] == 0 {
+            self.examples.insert(tile, change.clone());
+        }
         map.counts[tile] += 1;
-        self.examples.entry(tile).or_insert_with(|| change.clone());
         if self.listed.len() < self.plan.listed {
             self.listed.push(change);
         }

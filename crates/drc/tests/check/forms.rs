@@ -29,7 +29,7 @@ fn what_does_not_run_is_not_clean() {
     assert_eq!(report.exit_code(), 3);
     let junit = metalith_drc::junit(&report);
     assert_eq!(junit.matches("<error message=").count(), report.not_run());
-    insta::assert_snapshot!(metalith_drc::text(&report).lines().last().unwrap(), @"44 rules: 32 run; 7 not run: pillar.lattice, pillar.exposure_grid, density.fill, density.gradient, field.cut, field.in_lens, mark.keep_out; 5 not in force: mark.complete, design.pillar_count, design.width_map, design.phase_step, design.lattice_orders; 0 violations, 0 notes, 0 waived: not clean, and not all was checked");
+    insta::assert_snapshot!(metalith_drc::text(&report).lines().last().unwrap(), @"44 rules: 32 run; 7 not run: pillar.lattice, pillar.exposure_grid, density.fill, density.gradient, field.cut, field.in_lens, mark.keep_out; 5 not in force without a design: mark.complete, design.pillar_count, design.width_map, design.phase_step, design.lattice_orders; 0 violations, 0 notes, 0 waived: not clean, and not all was checked");
     // A layout too large to be expanded: what needs its shapes fails, what counts runs.
     let mut bomb = Gds::library();
     bomb.cell("L0").square(1, 0, 0, 200).end_cell();

@@ -279,7 +279,7 @@ mod tests {
     fn out_of_range_says_the_range() {
         let error = Material::named("sin_philipp_1973").unwrap().index(1.5).unwrap_err();
         assert_eq!(error.id(), "rcwa/material-out-of-range");
-        insta::assert_snapshot!(error, @"sin_philipp_1973 is known from 0.207 to 1.24 um, not at 1.5 um");
+        insta::assert_snapshot!(error, @"sin_philipp_1973 is known from 207 to 1240 nm, not at 1500 nm");
         match Material::named("glass").unwrap_err() {
             Error::UnknownMaterial { name, known } => {
                 assert!(
