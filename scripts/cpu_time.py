@@ -51,9 +51,9 @@ def main() -> int:
     words, runs = sys.argv[1:], 3
     if words[:1] == ["-n"]:
         runs, words = int(words[1]), words[2:]
-    if not words:
+    if not words or words[0] in ("-h", "--help"):
         print(__doc__)
-        return 2
+        return 0 if words else 2
     split = words.index("--") if "--" in words else len(words)
     commands = [part for part in (words[:split], words[split + 1 :]) if part]
     for _ in range(runs):

@@ -6,7 +6,7 @@ use clap::Args;
 use metalith::cell::{cache_folder, oblique_refused};
 use metalith::design::CellIncidence;
 use metalith::imaging::thumbnail;
-use metalith::report::{Figure, count, counted, sig};
+use metalith::report::{Figure, count, counted, exact, sig};
 use metalith::sensor::Camera;
 use metalith::{
     AsBuiltChip, CalibratedModel, Design, Error, Fidelity, FolderLock, PillarArray, PillarRows, Result,
@@ -333,8 +333,8 @@ fn print_failed(found: &Verification) {
         print_line!(
             "FAILS: {}: {} (limit {}, `{}`)",
             check.what,
-            sig(check.reached, 4),
-            sig(check.limit, 4),
+            check.reached_words(),
+            exact(check.limit),
             check.key
         );
     }

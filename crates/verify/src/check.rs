@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::{PsfPair, SampledElement, SampledSpot, SampledZones, Verification, WhiteChannel};
 use metalith_design::LimitSpec;
+use metalith_report::{count, sig};
 
 /// One limit and what was reached.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -49,6 +50,17 @@ impl Check {
         match self.sense {
             Sense::AtMost => self.reached <= self.limit,
             Sense::AtLeast => self.reached >= self.limit,
+        }
+    }
+
+    /// Value reached, for a reader: a count with all its digits, any other value to four significant ones.
+    pub fn reached_words(&self) -> String {
+        /// Digits below which `sig` writes all of a whole number.
+        const WRITTEN_IN_FULL: f64 = 1e7;
+        if self.reached >= WRITTEN_IN_FULL && self.reached.fract() == 0.0 {
+            count(self.reached as u64)
+        } else {
+            sig(self.reached, 4)
         }
     }
 }

@@ -180,7 +180,7 @@ fn limits(page: &mut Page, found: &Verification) {
         };
         table.row([
             Cell::from(check.what.as_str()),
-            Cell::sig(check.reached, 4),
+            Cell::from(check.reached_words()),
             Cell::from(format!("{sign} {}", exact(check.limit))),
             Cell::from(Verdict::of(check.passed())),
         ]);
