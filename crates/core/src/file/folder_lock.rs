@@ -1,6 +1,7 @@
 //! One run at a time writes the files of a folder.
 
 use std::fs::{self, File, TryLockError};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -13,10 +14,12 @@ use crate::progress::{Progress, Silent};
 pub(super) const PAUSE: Duration = Duration::from_millis(50);
 
 /// The turn of a run to write the files of a folder, which belong together: two runs at once would leave some of the one and
-/// some of the other. It ends when it is dropped, or with the process.
+/// some of the other. It ends when it is dropped, or with the process. A folder that was made for it and is empty by then is removed.
 #[derive(Debug)]
 pub struct FolderLock {
     folder: PathBuf,
+    /// True if the folder was not there before.
+    is_new: bool,
     /// The folder itself, locked; none where folders or their file system have no locks.
     locked: Option<File>,
     /// Files that nothing written here replaces.
@@ -32,6 +35,7 @@ impl FolderLock {
     pub fn wait(folder: &Path, progress: &dyn Progress, wait: impl FnOnce()) -> Result<Self> {
         let turn = Self {
             folder: folder.to_owned(),
+            is_new: !folder.exists(),
             locked: Self::locked(folder, progress, wait)?,
             inputs: InputFiles::default(),
         };
@@ -68,6 +72,7 @@ impl FolderLock {
     pub(super) fn without_locks(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
+            is_new: false,
             locked: None,
             inputs: InputFiles::default(),
         }
@@ -84,25 +89,58 @@ impl FolderLock {
         } else {
             folder
         };
-        fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
-        // A folder may be written and not read; and elsewhere it cannot be opened.
-        let Ok(opened) = File::open(folder) else {
-            return Ok(None);
-        };
         let mut wait = Some(wait);
+        // Who had the turn before may have removed the folder that was waited for.
         loop {
-            match opened.try_lock() {
-                Ok(()) => return Ok(Some(opened)),
-                Err(TryLockError::Error(_)) => return Ok(None),
-                Err(TryLockError::WouldBlock) => {}
+            fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
+            let opened = match File::open(folder) {
+                Ok(opened) => opened,
+                Err(why) if why.kind() == ErrorKind::NotFound => {
+                    progress.check_stopped()?;
+                    continue;
+                }
+                // A folder may be written and not read; and elsewhere it cannot be opened.
+                Err(_) => return Ok(None),
+            };
+            loop {
+                match opened.try_lock() {
+                    Ok(()) if is_at(&opened, folder) => return Ok(Some(opened)),
+                    Ok(()) => break,
+                    Err(TryLockError::Error(_)) => return Ok(None),
+                    Err(TryLockError::WouldBlock) => {}
+                }
+                progress.check_stopped()?;
+                if let Some(wait) = wait.take() {
+                    wait();
+                }
+                std::thread::sleep(PAUSE);
             }
-            progress.check_stopped()?;
-            if let Some(wait) = wait.take() {
-                wait();
-            }
-            std::thread::sleep(PAUSE);
         }
     }
+}
+
+impl Drop for FolderLock {
+    fn drop(&mut self) {
+        // Only while the lock keeps others out, who wait for a folder that stays.
+        if self.is_new && self.is_held() {
+            // A folder that holds anything is not removed.
+            let _ = fs::remove_dir(&self.folder);
+        }
+    }
+}
+
+/// True if an open folder is the one at a path.
+#[cfg(unix)]
+fn is_at(opened: &File, folder: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let [own, there] = [opened.metadata(), fs::metadata(folder)];
+    own.is_ok_and(|own| there.is_ok_and(|there| (own.dev(), own.ino()) == (there.dev(), there.ino())))
+}
+
+/// True if an open folder is the one at a path: elsewhere an open folder cannot be removed.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
 }
 
 #[cfg(test)]
@@ -134,6 +172,30 @@ mod tests {
         let other = FolderLock::wait(folder.path(), &Impatient, || panic!("another folder")).unwrap();
         drop((first, other));
         FolderLock::wait(&place, &Silent, || panic!("it is free again")).unwrap();
+    }
+
+    #[test]
+    fn a_new_folder_that_stays_empty_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = folder.path().join("new");
+        drop(FolderLock::of(&place).unwrap());
+        assert!(!place.exists() && folder.path().exists());
+        let turn = FolderLock::of(&place).unwrap();
+        fs::write(place.join("file"), "").unwrap();
+        drop(turn);
+        assert!(place.join("file").exists());
+        fs::remove_file(place.join("file")).unwrap();
+        drop(FolderLock::of(&place).unwrap());
+        assert!(place.exists(), "it was there before");
+    }
+
+    #[test]
+    fn who_waits_for_a_folder_that_is_removed_gets_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = folder.path().join("new");
+        let mut first = Some(FolderLock::of(&place).unwrap());
+        let turn = FolderLock::wait(&place, &Silent, || drop(first.take())).unwrap();
+        assert!(turn.is_held() && place.exists());
     }
 
     #[test]
