@@ -295,7 +295,7 @@ pub(crate) fn run(args: &PictureArgs, terminal: &Terminal) -> Result<Outcome> {
     }
     let light = &report.of_frame.light;
     print_line!(
-        "{}; a white pixel: {} electrons, SNR {}",
+        "{}; electrons of a white pixel: {}; its SNR: {}",
         light.words(),
         light.each(|w| Some(w.electrons), 0),
         light.each(|w| w.snr, 1)

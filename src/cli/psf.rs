@@ -3,7 +3,7 @@
 mod light;
 mod optics;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
@@ -339,8 +339,12 @@ fn known_light(args: &PsfArgs, found: &Extraction) -> Result<()> {
     Ok(())
 }
 
-/// Print the figures of each point spread function, with its focal length where planes through focus were simulated.
-fn print_psfs(psfs: &[SinglePsf], pixel_um: &str) {
+/// Print the figures of each point spread function of a layout with so many elements, with its focal length where planes through
+/// focus were simulated.
+fn print_psfs(psfs: &[SinglePsf], elements: usize, pixel_um: &str) {
+    if psfs.is_empty() {
+        return;
+    }
     for psf in psfs {
         print_line!(
             "{}, {} nm: Strehl {}{}, {} % in a pixel of {pixel_um} um, peak at ({}, {}) um",
@@ -365,6 +369,15 @@ fn print_psfs(psfs: &[SinglePsf], pixel_um: &str) {
             }
         }
     }
+    let simulated: BTreeSet<&str> = psfs.iter().map(|psf| psf.element.as_str()).collect();
+    let copies = elements - simulated.len();
+    if copies > 0 {
+        print_line!(
+            "{} not simulated: their pillars are those of an element above, whose figures hold for them",
+            counted(copies, "element")
+        );
+    }
+    print_line!("{STREHL_AGAINST}");
 }
 
 pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
@@ -493,10 +506,7 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     let pixel_um = light
         .as_ref()
         .map_or_else(String::new, |light| exact(args.pixel_um(light)));
-    print_psfs(&psfs, &pixel_um);
-    if !psfs.is_empty() {
-        print_line!("{STREHL_AGAINST}");
-    }
+    print_psfs(&psfs, found.elements.len(), &pixel_um);
     for element in white.iter().flat_map(|w| &w.1) {
         for channel in &element.channels {
             print_line!(

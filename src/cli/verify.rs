@@ -307,6 +307,12 @@ fn summary(design: &Design, array: &PillarArray, found: &Verification, folder: &
         found.layout.file,
         sig(found.layout.bytes as f64 * 1e-6, 3)
     );
+    if found.foreign.total() > 0 {
+        print_line!(
+            "shapes that are no pillars of the design: {}",
+            found.foreign.by_why.words()
+        );
+    }
     for quantity in found.model.iter().flat_map(|m| &m.not_applied) {
         print_line!("{quantity}");
     }

@@ -258,7 +258,7 @@ impl StartCell {
                 &in_steps(
                     request.width_min_nm,
                     cell.widths_nm.0,
-                    "the narrowest pillar, and below the narrowest gap: ask your cleanroom",
+                    "a guess: ask your cleanroom for its narrowest pillar and gap",
                 ),
             ),
             line(
@@ -286,7 +286,7 @@ impl StartCell {
             keys.push(line(
                 "band_nm",
                 band,
-                "that `metalith cells` tabulates; decides nothing of the layout",
+                "the light of pictures, which `metalith cells` tabulates; decides nothing of the layout",
             ));
         }
         let mapping_text = [

@@ -66,7 +66,7 @@ pub enum Error {
     },
 
     /// The user asked to stop. What was complete has been kept, nothing is half written.
-    #[error("interrupted; files written before this run are unchanged")]
+    #[error("interrupted; no file is half-written")]
     Interrupted,
 }
 

@@ -115,13 +115,13 @@ impl OutlineRule {
             OutlineCheck::NoCrossing => outline.crosses_itself().then(|| "the outline crosses itself".into()),
             OutlineCheck::NoDoubled => {
                 let doubled = points.windows(2).filter(|w| w[0] == w[1]).count();
-                (doubled > 0).then(|| format!("{doubled} vertices on the one before"))
+                (doubled > 0).then(|| format!("{} on the one before", vertices(doubled)))
             }
             OutlineCheck::NoCollinear => {
                 let distinct = points.windows(2).filter(|w| w[0] != w[1]).count() + 1;
                 let needless = distinct.saturating_sub(outline.corners().len());
                 (needless > 0 && points.first() == points.last())
-                    .then(|| format!("{needless} vertices on the way between their neighbours"))
+                    .then(|| format!("{} on a straight edge", vertices(needless)))
             }
             OutlineCheck::Area => (outline.twice_area() == 0).then(|| "no area".into()),
             OutlineCheck::Winding(counter_clockwise) => {
@@ -195,5 +195,13 @@ impl Rule for OutlineRule {
         if let Some(words) = self.wrong(outline) {
             found.copies(outline.points, outline.placements, || words.clone());
         }
+    }
+}
+
+/// A number of vertices in words.
+fn vertices(number: usize) -> String {
+    match number {
+        1 => "1 vertex".into(),
+        _ => format!("{number} vertices"),
     }
 }

@@ -186,6 +186,22 @@ pub(crate) fn check_coverage(scene: &SceneImage, channels: &[ChannelSampling]) -
     Ok(())
 }
 
+/// Words for light that the channels of a camera count and the band of a design does not hold, which is not simulated; `None` where
+/// it is little.
+pub(crate) fn light_left_out(channels: &[ChannelSampling], design: &Design) -> Option<String> {
+    let (low, high) = design.band_um().ok()?;
+    let least = channels.iter().map(|channel| channel.counted).fold(1.0, f64::min);
+    (least < LEAST_COVERED).then(|| {
+        let each = channels.iter().map(|c| format!("{:.0} % of `{}`", 100.0 * c.counted, c.name));
+        let [low, high] = [low, high].map(|um| (um * 1e3).round());
+        format!(
+            "only light from {low} to {high} nm is simulated, the band of the design: {} of what the channels count; colours, \
+             exposure and scores are those of a picture in this band. Widen `band_nm` of [cell] for all of the light",
+            each.collect::<Vec<_>>().join(", ")
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -15,7 +15,7 @@ use crate::approximation_set::ApproximationSet;
 use crate::chip::{ChipInLight, element_views, incidence, sampling_of, sensor_um};
 use crate::colour::ChannelColours;
 use crate::exposure::ChosenExposure;
-use crate::field_of_view::{check_coverage, check_view, check_windows, needed_reach_um};
+use crate::field_of_view::{check_coverage, check_view, check_windows, light_left_out, needed_reach_um};
 use crate::geometry::{ElementView, SceneView};
 use crate::imaging_system::ImagingSystem;
 use crate::kernel_parts::KernelParts;
@@ -201,9 +201,10 @@ impl<'a> KernelPlan<'a> {
         })
     }
 
-    /// Note on the pixels of the scene, if they are not those that were given.
-    pub(crate) fn averaging(&self) -> Option<String> {
-        averaging(&self.given, &self.scene.view)
+    /// Notes on light that is left out, and on the pixels of the scene if they are not those that were given.
+    pub(crate) fn notes(&self) -> impl Iterator<Item = String> {
+        let light = light_left_out(&self.channels, self.design);
+        light.into_iter().chain(averaging(&self.given, &self.scene.view))
     }
 
     /// Inputs that decide the kernels of a layout.
@@ -426,9 +427,9 @@ mod tests {
         // Each pixel is the mean of four.
         let SceneView { rows, columns, .. } = plan.scene.view;
         assert_eq!((plan.given, rows, columns), (scene.view, 50, 1374));
-        assert!(plan.scene.planes[0].iter().all(|v| *v == 0.5) && plan.averaging().is_some());
+        assert!(plan.scene.planes[0].iter().all(|v| *v == 0.5) && plan.notes().count() == 1);
         let coarse = SceneImage::of_rgb("coarse", &Array3::zeros((64, 64, 3)), 80.0, f64::INFINITY);
         let plan = KernelPlan::new(&design, &camera, &coarse).unwrap();
-        assert!(matches!(plan.scene, Cow::Borrowed(_)) && plan.averaging().is_none());
+        assert!(matches!(plan.scene, Cow::Borrowed(_)) && plan.notes().count() == 0);
     }
 }

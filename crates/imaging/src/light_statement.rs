@@ -90,15 +90,22 @@ impl LightStatement {
     /// Light, time and electrons in a sentence.
     pub fn sentence(&self) -> String {
         format!(
-            "Light: {}; a white pixel has {} electrons, channel by channel.",
+            "Light: {}; electrons of a white pixel: {}.",
             self.words(),
             self.each(|w| Some(w.electrons), 0)
         )
     }
 
-    /// A quantity of the white pixel of each channel, in words; a dash where there is none.
+    /// A quantity of the white pixel of each channel, in words, with the name of the channel if there are several; a dash where there
+    /// is none.
     pub fn each(&self, of: impl Fn(&WhitePixel) -> Option<f64>, digits: usize) -> String {
-        let one = |w: &WhitePixel| of(w).map_or_else(|| "-".into(), |v| fixed(v, digits));
+        let one = |w: &WhitePixel| {
+            let value = of(w).map_or_else(|| "-".into(), |v| fixed(v, digits));
+            match self.white.len() {
+                1 => value,
+                _ => format!("{} {value}", w.channel),
+            }
+        };
         let all: Vec<String> = self.white.iter().map(one).collect();
         all.join(", ")
     }

@@ -129,7 +129,7 @@ impl ImagingSystem {
         let notes = pillars.as_ref().and_then(PillarCount::note);
         notes
             .into_iter()
-            .chain(plan.averaging())
+            .chain(plan.notes())
             .for_each(|note| progress.warn(&note));
         let (bank, stray_light) = match (bank, stray_light) {
             (Some(bank), Some(stray_light)) => (bank, stray_light),

@@ -14,6 +14,7 @@ use crate::approximation_scores::AssumedScore;
 use crate::chip::sensor_um;
 use crate::element_images::ElementImage;
 use crate::exposure::Frame;
+use crate::field_of_view::light_left_out;
 use crate::files::{FrameFile, picture_file};
 use crate::forecast::NaturalForecast;
 use crate::imaging_system::ImagingSystem;
@@ -238,7 +239,12 @@ impl ImagingSystem {
     /// Notes on a frame, to read before its picture is viewed; `truth` is the scene in linear sRGB.
     pub fn notes(&self, frame: &Frame, truth: &Array3<f64>) -> Vec<String> {
         let layout = self.pillars.as_ref().and_then(PillarCount::note);
-        let all = [frame.saturation_note(truth), layout, averaging(&self.given, &self.view)];
+        let all = [
+            light_left_out(&self.channels, &self.design),
+            frame.saturation_note(truth),
+            layout,
+            averaging(&self.given, &self.view),
+        ];
         self.light()
             .notes()
             .into_iter()
@@ -410,6 +416,8 @@ impl ImagingSystem {
         ];
         all.extend(polarised);
         all.extend(self.pillars.as_ref().map(|found| assumption("layout", found.words())));
+        let left_out = light_left_out(&self.channels, &self.design);
+        all.extend(left_out.map(|words| assumption("light outside of the band", words)));
         let averaged = averaging(&self.given, &self.view);
         all.extend(averaged.map(|words| {
             let words = format!("{words}; pictures have the size of the averaged scene, and scores compare with it");

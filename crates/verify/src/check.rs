@@ -55,9 +55,8 @@ impl Check {
 
     /// Value reached, for a reader: a count with all its digits, any other value to four significant ones.
     pub fn reached_words(&self) -> String {
-        /// Digits below which `sig` writes all of a whole number.
-        const WRITTEN_IN_FULL: f64 = 1e7;
-        if self.reached >= WRITTEN_IN_FULL && self.reached.fract() == 0.0 {
+        // Counts have whole limits.
+        if self.reached.fract() == 0.0 && self.limit.fract() == 0.0 && self.reached >= 0.0 {
             count(self.reached as u64)
         } else {
             sig(self.reached, 4)

@@ -89,16 +89,21 @@ impl PsfArgs {
         }
         let of_design = self.stated.as_ref().and_then(|file| file.focal_length_um).is_some();
         let is_published = matches!(self.fidelity, FidelityArg::Published) && self.model.is_none();
+        // Each guess, and the option that would say it.
         let guesses = [
-            (self.stated.is_none() && !is_published).then(|| format!("pillars of {}", self.pillars())),
-            (self.asked_distance_um.is_none() && !of_design).then(|| format!("{USUAL_DISTANCE_UM} um to the sensor")),
-            (self.wavelengths_nm.is_empty() && self.camera.is_none()).then(|| "455, 530 and 660 nm".to_owned()),
+            (self.stated.is_none() && !is_published)
+                .then(|| (format!("pillars of {}", self.pillars()), "`--cell DESIGN.toml`")),
+            (self.asked_distance_um.is_none() && !of_design)
+                .then(|| (format!("{USUAL_DISTANCE_UM} um to the sensor"), "--distance-um")),
+            (self.wavelengths_nm.is_empty() && self.camera.is_none())
+                .then(|| ("455, 530 and 660 nm".to_owned(), "--wavelength-nm")),
         ];
-        let guesses: Vec<String> = guesses.into_iter().flatten().collect();
+        let (guesses, options): (Vec<String>, Vec<&str>) = guesses.into_iter().flatten().unzip();
         if !guesses.is_empty() {
             terminal.say(&format!(
-                "assumed, because no option says it: {}; give `--cell DESIGN.toml`, --distance-um and --wavelength-nm",
-                guesses.join("; ")
+                "assumed, because no option says it: {}; give {}",
+                guesses.join("; "),
+                options.join(", ")
             ));
         }
     }

@@ -2,11 +2,13 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use crate::cell::LayoutCell;
 use crate::extract::survey;
 use crate::layout::Layout;
 use crate::limits::FARTHEST;
 use crate::shape::{Point, Rect};
 use crate::transform::Transform;
+use crate::tree::Tree;
 use crate::visit::Selection;
 use crate::{Error, Result};
 use metalith_core::{LayerNumber, Progress};
@@ -81,17 +83,9 @@ pub(super) fn boxes(layout: &Layout, roots: &[usize]) -> Option<Boxes> {
         }
         let own = cell.layers.iter().filter(|(_, tally)| !tally.bounds.is_empty());
         let mut boxes: LayerBoxes = own.map(|(layer, tally)| (*layer, tally.bounds)).collect();
-        // Circles and dangling names are rare, and so is this map.
-        let whole = cell.children.iter().all(|child| child.cell.is_some() && !child.cut);
-        let followed = cell.children.iter().filter(|child| !whole && !child.cut);
-        let followed: HashMap<u32, Option<usize>> = followed.map(|child| (child.number, child.cell)).collect();
+        let target = followed(cell, tree);
         for reach in &counts.reaches {
-            let target = if whole {
-                tree.definitions[reach.number as usize]
-            } else {
-                followed.get(&reach.number).copied().flatten()
-            };
-            let Some(target) = target else { continue };
+            let Some(target) = target(reach.number) else { continue };
             placed += found[target].len();
             if placed > MOST_BOXES {
                 return None;
@@ -118,6 +112,21 @@ pub(super) fn boxes(layout: &Layout, roots: &[usize]) -> Option<Boxes> {
         }
     }
     Some(out)
+}
+
+/// Cell that a reference of `cell` to a name of this number leads to; none where the name has no cell or closes a circle.
+pub(super) fn followed<'t>(cell: &LayoutCell, tree: &'t Tree) -> impl Fn(u32) -> Option<usize> + 't {
+    // Circles and dangling names are rare, and so is this map.
+    let whole = cell.children.iter().all(|child| child.cell.is_some() && !child.cut);
+    let followed = cell.children.iter().filter(|child| !whole && !child.cut);
+    let followed: HashMap<u32, Option<usize>> = followed.map(|child| (child.number, child.cell)).collect();
+    move |number| {
+        if whole {
+            tree.definitions[number as usize]
+        } else {
+            followed.get(&number).copied().flatten()
+        }
+    }
 }
 
 /// The box around a box that is turned, then shifted by everything in `shifts`.

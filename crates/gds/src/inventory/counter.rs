@@ -27,8 +27,8 @@ pub struct KindTally {
     pub circles: u64,
     pub polygons: u64,
     pub paths: u64,
-    /// Smallest and largest side of squares and rectangles and diameter of circles, as drawn in their cells (database
-    /// units); the smallest is above the largest if there are none.
+    /// Smallest and largest side of squares and rectangles and diameter of circles (database units); the smallest is above the
+    /// largest if there are none.
     #[serde(skip)]
     pub(super) sides: [i64; 2],
 }
@@ -67,8 +67,7 @@ impl KindTally {
             .fold(0, u64::saturating_add)
     }
 
-    /// Smallest and largest side of squares and rectangles and diameter of circles, as drawn in their cells; a database unit
-    /// is so long (nm).
+    /// Smallest and largest side of squares and rectangles and diameter of circles; a database unit is so long (nm).
     pub fn sides_nm(&self, unit_nm: f64) -> Option<[f64; 2]> {
         (self.sides[0] <= self.sides[1]).then(|| self.sides.map(|side| side as f64 * unit_nm))
     }
@@ -107,8 +106,8 @@ impl KindTally {
         }
     }
 
-    /// Add so many copies of another.
-    pub(super) fn add(&mut self, other: &Self, times: u64) {
+    /// Add so many copies of another, between the least and the greatest of these magnifications.
+    pub(super) fn add(&mut self, other: &Self, times: u64, magnifications: [f64; 2]) {
         let add = |sum: &mut u64, n: u64| *sum = sum.saturating_add(n.saturating_mul(times));
         add(&mut self.squares, other.squares);
         add(&mut self.rectangles, other.rectangles);
@@ -116,7 +115,10 @@ impl KindTally {
         add(&mut self.circles, other.circles);
         add(&mut self.polygons, other.polygons);
         add(&mut self.paths, other.paths);
-        self.side(other.sides[0], other.sides[1]);
+        if other.sides[0] <= other.sides[1] {
+            let [smallest, largest] = [0, 1].map(|end| (other.sides[end] as f64 * magnifications[end]).round() as i64);
+            self.side(smallest, largest);
+        }
     }
 }
 

@@ -5,12 +5,14 @@ mod boxes;
 pub(crate) mod contents;
 mod counter;
 mod lattices;
+mod magnifications;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use serde::Serialize;
 
+use self::magnifications::magnifications;
 use crate::error::Result;
 use crate::layout::{Faulty, Layout};
 use crate::shape::Rect;
@@ -48,7 +50,7 @@ pub struct LayerInventory {
     #[serde(flatten)]
     pub kinds: KindTally,
     pub texts: u64,
-    /// Smallest and largest side of squares and rectangles and diameter of circles, as drawn in their cells (nm).
+    /// Smallest and largest side of squares and rectangles and diameter of circles (nm).
     pub sides_nm: Option<[f64; 2]>,
     /// Left, bottom, right, top of all areas (nm). None if there are no areas or too many boxes.
     pub bounds_nm: Option<[f64; 4]>,
@@ -208,7 +210,11 @@ impl Layout {
             let unit = self.unit_nm();
             (!r.is_empty()).then(|| [r.x0, r.y0, r.x1, r.y1].map(|v| v as f64 * unit))
         };
-        let layers = self.layers(&counts, boxes.as_ref().map(|b| &b.layers));
+        let layers = self.layers(
+            &counts,
+            &magnifications(self, &roots),
+            boxes.as_ref().map(|b| &b.layers),
+        );
         let cells = self.cells().iter().zip(&counts).enumerate();
         let cells = cells.take(LISTED).map(|(index, (cell, &copies))| CellInventory {
             name: cell.name.clone(),
@@ -261,10 +267,12 @@ impl Layout {
     /// [`Layout::open_counted`].
     pub fn kinds_on(&self, layer: LayerNumber) -> KindTally {
         let mut sum = KindTally::default();
-        for cell in self.cells().iter().filter(|cell| cell.placements > 0) {
+        let magnifications = magnifications(self, self.tops());
+        let each = self.cells().iter().zip(magnifications);
+        for (cell, magnifications) in each.filter(|(cell, _)| cell.placements > 0) {
             let kinds = cell.counts.iter().flat_map(|counts| &counts.kinds);
             let on_layer = cell.layers.iter().zip(kinds).filter(|((l, _), _)| *l == layer);
-            on_layer.for_each(|(_, kinds)| sum.add(kinds, cell.placements));
+            on_layer.for_each(|(_, kinds)| sum.add(kinds, cell.placements, magnifications));
         }
         sum
     }
@@ -285,15 +293,21 @@ impl Layout {
         layers.into_iter().collect()
     }
 
-    fn layers(&self, counts: &[u64], boxes: Option<&boxes::LayerBoxes>) -> Vec<LayerInventory> {
+    fn layers(
+        &self,
+        counts: &[u64],
+        magnifications: &[[f64; 2]],
+        boxes: Option<&boxes::LayerBoxes>,
+    ) -> Vec<LayerInventory> {
         let mut sums: BTreeMap<LayerNumber, (u64, u64, KindTally)> = BTreeMap::new();
-        for (cell, &times) in self.cells().iter().zip(counts).filter(|(_, times)| **times > 0) {
+        let each = self.cells().iter().zip(counts).zip(magnifications);
+        for ((cell, &times), &magnifications) in each.filter(|((_, times), _)| **times > 0) {
             for (k, (layer, tally)) in cell.layers.iter().enumerate() {
                 let sum = sums.entry(*layer).or_default();
                 sum.0 = sum.0.saturating_add(tally.shapes().saturating_mul(times));
                 sum.1 = sum.1.saturating_add(tally.texts.saturating_mul(times));
                 if let Some(kinds) = cell.counts.as_ref().and_then(|counts| counts.kinds.get(k)) {
-                    sum.2.add(kinds, times);
+                    sum.2.add(kinds, times, magnifications);
                 }
             }
         }
@@ -488,6 +502,34 @@ mod tests {
             (found.tops.as_slice(), found.copies),
             (["BB".to_owned()].as_slice(), copies)
         );
+    }
+
+    /// Sides are those of shapes as they stand: of a square of 100 nm in a cell of twice the size, in one of three times.
+    #[test]
+    fn sides_are_as_large_as_their_cells_are_placed() {
+        let mut records = Records::new();
+        records.cell("AA").outline(&SQUARE).put(kind::ENDSTR, 0, &[]);
+        records.cell("BB");
+        for magnification in [2, 1] {
+            // An 8-byte real: an exponent of 65, and sixteenths.
+            let real = [0x41, 0x10 * magnification, 0, 0, 0, 0, 0, 0];
+            records
+                .put(kind::SREF, 0, &[])
+                .put(kind::SNAME, 6, b"AA")
+                .put(kind::STRANS, 1, &[0, 0])
+                .put(kind::MAG, 5, &real)
+                .xy(&[[1000, 2000]]);
+        }
+        records.put(kind::ENDSTR, 0, &[]);
+        records.cell("CC");
+        records
+            .put(kind::SREF, 0, &[])
+            .put(kind::SNAME, 6, b"BB")
+            .put(kind::STRANS, 1, &[0, 0])
+            .put(kind::MAG, 5, &[0x41, 0x30, 0, 0, 0, 0, 0, 0])
+            .xy(&[[0, 0]]);
+        let found = records.put(kind::ENDSTR, 0, &[]).inventory();
+        assert_eq!(found.layers[0].sides_nm, Some([300.0, 600.0]));
     }
 
     /// A square at 45 degrees in a cell that is placed at 45 degrees, in a cell that is placed at 90: its own edge, not the box of a box.

@@ -203,7 +203,7 @@ impl<'a> ElementSimulator<'a> {
             }
             let pairs = tasks.into_par_iter().map_init(Scratch::default, |scratch, task| {
                 progress.check_stopped()?;
-                let pair = self.pair(&task, (element, phase), designed, scratch);
+                let pair = self.pair(&task, (element, phase), designed, (scratch, progress));
                 progress.done();
                 pair
             });
@@ -274,7 +274,7 @@ impl<'a> ElementSimulator<'a> {
         task: &Task<'_>,
         (element, phase): (&Element, &ElementPhase<'_>),
         designed: &dyn Aperture,
-        scratch: &mut Scratch,
+        (scratch, progress): (&mut Scratch, &Steps<'_>),
     ) -> Result<PsfPair> {
         let (lens, spec) = (self.design.lens_of(element), &self.design.verify);
         let Task { field, wave, .. } = task;
@@ -288,7 +288,15 @@ impl<'a> ElementSimulator<'a> {
         };
         let frequencies = PixelFrequencies::of(spec.pixel_um);
         let (drawn, reported) = (frequencies.drawn(), frequencies.reported());
+        // Each field of a large element takes minutes.
+        let fields = 1 + task.cases.len() as u64;
+        progress.begin("fields", fields);
+        let formed = || {
+            progress.advance(1);
+            progress.check_stopped()
+        };
         let designed = Psf::formed(&fold, designed, wave, &drawn, scratch)?;
+        formed()?;
         let perfect = self.perfect(element, phase, chief, wavelength_um);
         let mut extracted = Vec::new();
         let mut judged = None;
@@ -299,6 +307,7 @@ impl<'a> ElementSimulator<'a> {
             let matched = perfect.scaled(case.full_transmission(wavelength_um)?);
             extracted.push((case.fidelity(), PsfResult::of(&found, &matched, spec.pixel_um)));
             judged.get_or_insert(found);
+            formed()?;
         }
         let judged = judged.expect("the case that judges is the first");
         let full = self.judge().case().full_transmission(wavelength_um)?;
