@@ -394,7 +394,9 @@ pub(crate) fn run(args: &PsfArgs, terminal: &Terminal) -> Result<Outcome> {
     let found = extract(&layout, &ExtractionPlan::discover(layer), terminal)?;
     let left_out = LeftOut::of(&found, layer);
     mostly_pillars(args, layer, &found, left_out.as_ref())?;
-    one_kind(args, &found)?;
+    if !args.extract_only {
+        one_kind(args, &found)?;
+    }
     known_light(args, &found)?;
     let light = if args.extract_only {
         None

@@ -189,9 +189,13 @@ impl Comparison {
         };
         open.stages_have_cameras()?;
         if view != first {
+            let of_several = if open.designs.len() > 1 {
+                ": scores of finer cameras differ from those that they have alone"
+            } else {
+                ""
+            };
             progress.warn(&format!(
-                "all photographs are averaged from {} x {} to {} x {} pixels, as finely as the coarsest camera is simulated: scores of finer \
-                 cameras differ from those that they have alone",
+                "all photographs are averaged from {} x {} to {} x {} pixels, as finely as the coarsest camera is simulated{of_several}",
                 first.columns, first.rows, view.columns, view.rows
             ));
         }

@@ -239,15 +239,10 @@ impl ImagingSystem {
     /// Notes on a frame, to read before its picture is viewed; `truth` is the scene in linear sRGB.
     pub fn notes(&self, frame: &Frame, truth: &Array3<f64>) -> Vec<String> {
         let layout = self.pillars.as_ref().and_then(PillarCount::note);
-        let all = [
-            light_left_out(&self.channels, &self.design),
-            frame.saturation_note(truth),
-            layout,
-            averaging(&self.given, &self.view),
-        ];
-        self.light()
-            .notes()
+        let all = [frame.saturation_note(truth), layout, averaging(&self.given, &self.view)];
+        light_left_out(&self.channels, &self.design)
             .into_iter()
+            .chain(self.light().notes())
             .chain(self.direction_notes())
             .chain(all.into_iter().flatten())
             .collect()

@@ -34,7 +34,12 @@ pub fn read_at_most(path: &Path, most: u64, what: &str) -> Result<Vec<u8>> {
         Err(Error::refused(id, format!("{} {why}", path.display()), hint))
     };
     if !found.is_file() {
-        return refused("file/not-regular", "is not an ordinary file".into());
+        let kind = if found.is_dir() {
+            "a folder"
+        } else {
+            "not an ordinary file"
+        };
+        return refused("file/not-regular", format!("is {kind}"));
     }
     if found.len() > most {
         return refused("file/too-large", format!("is {} bytes long", found.len()));

@@ -132,7 +132,7 @@ impl Filler {
     /// that are none.
     ///
     /// # Errors
-    /// [`ExtractionError::NotOfDesign`] after [`MOST_BEFORE_A_PILLAR`] shapes without a pillar.
+    /// [`ExtractionError::NotOfDesign`] after ten million shapes without a pillar.
     #[inline]
     pub fn check_of_design(&self, elsewhere: ReasonCounts) -> Result<(), ExtractionError> {
         if self.pillars > 0 || elsewhere.total() < MOST_BEFORE_A_PILLAR {
