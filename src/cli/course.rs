@@ -1,4 +1,4 @@
-//! Course of a command: the pieces of work that it does, so that progress is told of all of them.
+//! Schedule of a command: its pieces of work with their expected times, so that progress and time left are those of the whole.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ struct Piece {
     seconds: f64,
 }
 
-/// Pieces of work in their order. Work that is not among them is told alone, with the time that those after it take.
+/// Pieces of work in their order. Other work has its own progress, and the time left includes the pieces after it.
 #[derive(Default)]
 pub(crate) struct Course {
     pieces: Vec<Piece>,
@@ -25,7 +25,7 @@ pub(crate) struct Course {
     present: Option<Instant>,
 }
 
-/// Place of a piece in a course: how much of all is done, and what is left.
+/// Progress of the whole command: share done and time left.
 pub(crate) struct CoursePlace {
     /// Number of the piece from 1, and of all; none for work that is not among them.
     pub step: Option<[usize; 2]>,
@@ -215,9 +215,9 @@ impl Course {
 
 /// A time left in words.
 pub(crate) fn left(seconds: f64) -> String {
-    /// Longest time that is told in seconds.
+    /// Limit below which a time is written in seconds (s).
     const MOST_SECONDS: f64 = 180.0;
-    /// Longest time that is told in minutes (s).
+    /// Limit below which a time is written in minutes (s).
     const MOST_MINUTES: f64 = 3.0 * 3600.0;
     if seconds < MOST_SECONDS {
         format!("{seconds:.0} s left")

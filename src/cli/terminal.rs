@@ -48,13 +48,13 @@ pub struct Terminal {
     warned: Mutex<BTreeSet<String>>,
 }
 
-/// What is shown of work, from any thread.
+/// Display of the progress, shared by all threads.
 struct Shown {
     bar: Mutex<Option<ProgressBar>>,
     told: Mutex<Told>,
 }
 
-/// Progress of work, and when it was told.
+/// State of the progress, and the time of the last report.
 struct Told {
     course: Course,
     work: Option<Work>,

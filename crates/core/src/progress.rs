@@ -90,13 +90,13 @@ pub struct Steps<'p> {
     present: Mutex<PresentStep>,
 }
 
-/// Parts of a step that are told.
+/// Resolution of the progress within a step: reported units of each step.
 const PARTS: u64 = 1000;
 
-/// Share of what is left of a step that work within it takes: more may follow.
+/// Share of the remaining step that nested work advances: more nested work may follow.
 const WITHIN: f64 = 0.9;
 
-/// Present step of [`Steps`], in parts of it.
+/// Progress of the present step of [`Steps`], in units of [`PARTS`].
 #[derive(Default)]
 struct PresentStep {
     told: u64,
